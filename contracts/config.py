@@ -1,0 +1,111 @@
+"""What can be set, with its defaults: refused on unknown keys, digested into every artefact."""
+
+import hashlib
+import json
+from itertools import combinations
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from contracts.errors import BadConfig
+
+Detector = Literal["hesaff", "mser", "star", "har", "orb"]
+Descriptor = Literal["sift", "surf", "sc"]
+Vote = Literal["union", "intersection", "pairwise"]
+Weight = Literal["idf", "norm", "burst"]
+North = Literal["grid", "true", "magnetic"]
+
+DETECTORS: tuple[Detector, ...] = ("hesaff", "mser", "star", "har", "orb")
+DESCRIPTORS: tuple[Descriptor, ...] = ("sift", "surf", "sc")
+DESCRIPTOR_SIZES: dict[Descriptor, int] = {"sift": 128, "surf": 64, "sc": 36}
+MAX_NEIGHBOURS = 10
+"""Largest k of a query; dmin and dmax are stored for every k up to it."""
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @classmethod
+    def of(cls, **settings: object) -> Self:
+        """Build from named settings; a wrong one is `BadConfig` and says which."""
+        try:
+            return cls.model_validate(settings)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"])
+            message = first["msg"].removeprefix("Value error, ")
+            raise BadConfig(f"{where}: {message}" if where else message) from error
+
+    def digest(self) -> str:
+        """First 16 hex digits of the SHA-256 of the settings as canonical JSON."""
+        canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+
+
+class FeatureConfig(_Frozen):
+    """How an image becomes descriptors (METHOD section 1)."""
+
+    detectors: tuple[Detector, ...] = DETECTORS
+    descriptors: tuple[Descriptor, ...] = DESCRIPTORS
+    max_frames: Annotated[int, Field(ge=1, le=20_000)] = 1000
+    """Frames kept per detector and image."""
+    max_side_px: Annotated[int, Field(ge=16, le=16_384)] = 1024
+    max_pixels: Annotated[int, Field(ge=1)] = 250_000_000
+    use_masks: bool = True
+    make_upright: bool = True
+
+    @model_validator(mode="after")
+    def _no_repeats(self) -> Self:
+        for name, chosen in (("detectors", self.detectors), ("descriptors", self.descriptors)):
+            if not chosen or len(set(chosen)) != len(chosen):
+                raise ValueError(f"{name} must be named once each, at least one; got {chosen}")
+        return self
+
+    def channels(self) -> tuple[str, ...]:
+        """Every detector-descriptor name, such as `hesaff-sift`, in index order."""
+        return tuple(f"{det}-{desc}" for det in self.detectors for desc in self.descriptors)
+
+    def pairs(self) -> tuple[tuple[Detector, Detector], ...]:
+        """Every unordered pair of detectors, in index order."""
+        return tuple(combinations(self.detectors, 2))
+
+
+class CodebookConfig(_Frozen):
+    """How a channel's visual words are made (METHOD section 2)."""
+
+    codebook_ratio: Annotated[float, Field(gt=0, le=1)] = 0.2
+    max_words: Annotated[int, Field(ge=1, le=1_000_000)] = 20_000
+    max_train_points: Annotated[int, Field(ge=1)] = 1_000_000
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
+
+
+class IndexConfig(_Frozen):
+    """All that decides an index's bytes. Shard size and workers are absent on purpose."""
+
+    features: FeatureConfig = FeatureConfig()
+    codebooks: CodebookConfig = CodebookConfig()
+
+
+class SearchConfig(_Frozen):
+    """How a photo is searched for (METHOD sections 3 and 4)."""
+
+    pair: tuple[Detector, ...] | Literal["auto"] = "auto"
+    """One detector, two, or `auto`: the model chooses a pair."""
+    k: Annotated[int, Field(ge=1, le=MAX_NEIGHBOURS)] | Literal["auto"] = "auto"
+    descriptors: tuple[Descriptor, ...] | None = None
+    """None: all that the index has."""
+    vote: Vote = "intersection"
+    weights: tuple[Weight, ...] = ("idf", "norm")
+    top: Annotated[int, Field(ge=1, le=10_000)] = 10
+    max_images: Annotated[int, Field(ge=1)] | None = None
+    """The T of the multi-sequence walk (`union` only); None: T does not bind."""
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if self.pair != "auto" and (
+            not 1 <= len(self.pair) <= 2 or len(set(self.pair)) != len(self.pair)
+        ):
+            raise ValueError(f"--pair takes one detector or two different ones; got {self.pair}")
+        if self.max_images is not None and self.vote != "union":
+            raise ValueError("max_images belongs to the vote `union`")
+        return self

@@ -1,0 +1,58 @@
+"""The one tree of exceptions.
+
+FlaneurError
+├── WrongInput               the user can mend it: exit 2
+│   ├── BadSurvey            not a survey, empty, or its metadata does not hold
+│   ├── UnknownCrs           a coordinate system is missing, unknown or cannot be converted
+│   ├── BadTruth             a ground truth names no image, or several
+│   ├── BadConfig            an option or a combination of options makes no sense
+│   └── BadIndex             not an index, a future format, or a damaged one
+├── VocabularyMismatch       postings or words of different codebooks were put together: exit 1
+├── BrokerUnreachable        no server answers at the broker's address: exit 1
+├── TaskFailed               a shard, channel or query could not be worked on; names it: exit 1
+└── UnusableImage            one image cannot be used; caught where a reason is recorded
+"""
+
+
+class FlaneurError(Exception):
+    """Base of all errors raised on purpose. The message says what to mend."""
+
+
+class WrongInput(FlaneurError):
+    """What was given cannot be worked with; the command line exits with 2."""
+
+
+class BadSurvey(WrongInput):
+    """Not a survey, an empty one, or one whose metadata does not hold."""
+
+
+class UnknownCrs(WrongInput):
+    """A coordinate reference system is missing, unknown, or has no exact enough conversion."""
+
+
+class BadTruth(WrongInput):
+    """A ground truth file names no indexed image, or several."""
+
+
+class BadConfig(WrongInput):
+    """An option, or a combination of options, makes no sense."""
+
+
+class BadIndex(WrongInput):
+    """Not an index, one of a later format, or a damaged one."""
+
+
+class VocabularyMismatch(FlaneurError):
+    """Postings or words of different codebooks were put together."""
+
+
+class BrokerUnreachable(FlaneurError):
+    """No server answers at the broker's address."""
+
+
+class TaskFailed(FlaneurError):
+    """A shard, channel or query could not be worked on; the message names it."""
+
+
+class UnusableImage(FlaneurError):
+    """One image cannot be used; its message is the reason that gets recorded."""
