@@ -1,0 +1,1 @@
+"""The foreman: survey -> shards -> tasks -> one committed index; and the command line."""

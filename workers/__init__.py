@@ -1,0 +1,1 @@
+"""The hands: the Celery app, its thin tasks, and the stages they run."""

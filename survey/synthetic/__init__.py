@@ -1,0 +1,5 @@
+"""A street-level survey that Flaneur renders itself, with query photos and the truth."""
+
+from survey.synthetic.demo import DemoQuery, DemoSurvey, render_survey
+
+__all__ = ["DemoQuery", "DemoSurvey", "render_survey"]

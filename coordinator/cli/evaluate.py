@@ -1,0 +1,66 @@
+"""`flaneur evaluate`: how well photos of known places are found."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coordinator.cli.lists import (
+    Broker,
+    Descriptors,
+    IndexFolder,
+    K,
+    Pair,
+    Vote,
+    Weights,
+    Workers,
+    search_config,
+)
+from coordinator.cli.show import bars, complain
+
+NAME = "evaluate"
+SOME_SKIPPED = 3
+
+
+def command(
+    index: IndexFolder,
+    truth: Annotated[Path, typer.Option(help="JSON: query path -> relevant references.")],
+    root: Annotated[
+        Path | None, typer.Option(help="Folder of the queries; default: the truth file's.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the report.")] = None,
+    pair: Pair = "auto",
+    k: K = "auto",
+    vote: Vote = "intersection",
+    weights: Weights = "idf,norm",
+    descriptors: Descriptors = None,
+    workers: Workers = None,
+    broker: Broker = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> int:
+    """Search for every query of a ground truth and score the rankings."""
+    from coordinator.engine import running_engine
+    from coordinator.evaluating import report_of, table_of
+    from coordinator.querying import judge_queries
+    from coordinator.truth import read_truth
+    from index.files import write_bytes
+    from index.opened import OpenedIndex
+
+    search = search_config(pair, k, vote, weights, descriptors, top=10)
+    opened = OpenedIndex(index.absolute())
+    queries = read_truth(truth, root, opened.catalogue.column("uri"))
+    with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
+        progress.begin("evaluate", len(queries), 0)
+        answers = judge_queries(
+            opened, queries, search, engine.follower, lambda: progress.advance("evaluate")
+        )
+    report = report_of(answers, opened, search)
+    text = json.dumps(report, ensure_ascii=False, allow_nan=False)
+    if out is not None:
+        write_bytes(out.absolute() / "report.json", text.encode())
+        write_bytes(out.absolute() / "report.md", table_of(report).encode())
+    typer.echo(text if as_json else table_of(report))
+    for unreadable in report["unreadable"]:
+        complain(f"{unreadable['query']}: {unreadable['error']}")
+    return SOME_SKIPPED if report["unreadable"] else 0

@@ -1,0 +1,134 @@
+"""`flaneur index`: a survey becomes an index."""
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from contracts.config import DESCRIPTORS, DETECTORS, CodebookConfig, FeatureConfig, IndexConfig
+from contracts.errors import BadConfig
+from coordinator.cli.lists import Broker, Workers, names
+from coordinator.cli.show import bars, complain, list_skipped, tell
+
+NAME = "index"
+SOME_SKIPPED = 3
+
+
+def command(
+    survey: Annotated[Path, typer.Argument(help="A folder, or a pose table.")],
+    index: Annotated[Path, typer.Argument(help="Where the index goes.")],
+    also: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=SURVEY", help="Another survey; its uris begin with NAME/."),
+    ] = None,
+    include: Annotated[
+        list[str] | None, typer.Option(metavar="GLOB", help="Only uris like this.")
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(metavar="GLOB", help="No uris like this.")
+    ] = None,
+    crs: Annotated[str | None, typer.Option(help="CRS of a pose table, such as EPSG:2154.")] = None,
+    north: Annotated[
+        str | None, typer.Option(help="What headings are measured from: grid, true or magnetic.")
+    ] = None,
+    no_pose: Annotated[bool, typer.Option("--no-pose", help="Index images without poses.")] = False,
+    survey_format: Annotated[
+        str | None, typer.Option("--format", help="stereopolis, table, exif or plain.")
+    ] = None,
+    detectors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DETECTORS),
+    descriptors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DESCRIPTORS),
+    max_frames: Annotated[int, typer.Option(help="Frames a detector and image.")] = 1000,
+    max_words: Annotated[int, typer.Option(help="Largest codebook.")] = 20_000,
+    seed: Annotated[int, typer.Option(help="Seed of the codebooks.")] = 0,
+    stored_rotation: Annotated[
+        bool,
+        typer.Option("--stored-rotation", help="Leave images as stored, not put upright."),
+    ] = False,
+    no_masks: Annotated[
+        bool, typer.Option("--no-masks", help="Ignore the survey's masks.")
+    ] = False,
+    shard_size: Annotated[
+        int | None, typer.Option(min=1, max=10_000, help="Images a task.")
+    ] = None,
+    workers: Workers = None,
+    broker: Broker = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Report as JSON on stdout.")] = False,
+) -> int:
+    """Index a survey. Run again, it does only what is missing."""
+    from coordinator.engine import running_engine
+    from coordinator.indexing import run_job
+    from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
+    from survey import ReadOptions
+
+    if north not in (None, "grid", "true", "magnetic"):
+        raise BadConfig(f"--north takes grid, true or magnetic; got {north!r}")
+    config = IndexConfig(
+        features=FeatureConfig.of(
+            detectors=names(detectors),
+            descriptors=names(descriptors),
+            max_frames=max_frames,
+            use_masks=not no_masks,
+            make_upright=not stored_rotation,
+        ),
+        codebooks=CodebookConfig.of(max_words=max_words, seed=seed),
+    )
+    options = ReadOptions(
+        crs=crs,
+        north=north,
+        no_pose=no_pose,
+        include=tuple(include or ()),
+        exclude=tuple(exclude or ()),
+        format=survey_format,
+    )
+    started = time.perf_counter()
+    root = index.absolute()
+    intake = read_surveys([("", survey), *map(_named, also or ())], options)
+    job, plan = make_plan(root, intake, config, shard_size or DEFAULT_SHARD_SIZE)
+    tell(f"{len(intake.images)} images in {plan.n_shards} shards; job {plan.job}")
+    with bars() as progress:
+        report = run_job(job, plan, intake, running_engine(broker, workers), progress)
+    for warning in report.warnings:
+        complain(warning)
+    list_skipped(report.skipped, str(job.path / "skipped.json"))
+    generation = report.generation
+    seconds = time.perf_counter() - started
+    summary = {
+        "generation": generation.number,
+        "images": generation.n_images,
+        "extracted_now": report.images_extracted,
+        "skipped": [{"uri": each.uri, "reason": each.reason} for each in report.skipped],
+        "without_keypoints": report.without_frames,
+        "postings": generation.n_postings,
+        "bytes": report.bytes_on_disk,
+        "seconds": round(seconds, 3),
+        "images_per_second": round(report.images_extracted / seconds, 3),
+    }
+    if as_json:
+        typer.echo(json.dumps(summary, ensure_ascii=False))
+    else:
+        tell(_sentence(summary, root))
+    return SOME_SKIPPED if report.skipped else 0
+
+
+def _named(text: str) -> tuple[str, Path]:
+    name, separator, path = text.partition("=")
+    if not (separator and name and path) or "/" in name:
+        raise BadConfig(f"--also takes NAME=SURVEY, with no / in NAME; got {text!r}")
+    return name, Path(path)
+
+
+def _sentence(summary: dict[str, object], root: Path) -> str:
+    if not summary["extracted_now"]:
+        done = "nothing was missing"
+    else:
+        done = (
+            f"{summary['extracted_now']} extracted in {summary['seconds']:.1f} s, "
+            f"{summary['images_per_second']:.2f} images/s"
+        )
+    return (
+        f"{root}: generation {summary['generation']}, {summary['images']} images "
+        f"({summary['without_keypoints']} without keypoints), {summary['postings']:,} postings, "
+        f"{summary['bytes']:,} bytes; {done}"
+    )

@@ -1,0 +1,65 @@
+"""`flaneur train`: fit the adaptive choice of detectors and k to an index."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coordinator.cli.lists import (
+    Broker,
+    Descriptors,
+    IndexFolder,
+    Vote,
+    Weights,
+    Workers,
+    search_config,
+)
+from coordinator.cli.show import bars, complain, tell
+
+NAME = "train"
+SOME_SKIPPED = 3
+
+
+def command(
+    index: IndexFolder,
+    truth: Annotated[Path, typer.Option(help="JSON: query path -> relevant references.")],
+    root: Annotated[
+        Path | None, typer.Option(help="Folder of the queries; default: the truth file's.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the model here, not into the index.")
+    ] = None,
+    vote: Vote = "intersection",
+    weights: Weights = "idf,norm",
+    descriptors: Descriptors = None,
+    workers: Workers = None,
+    broker: Broker = None,
+) -> int:
+    """Fit the model that chooses detectors and k for each photo (Eq. 1 of the paper)."""
+    from coordinator.engine import running_engine
+    from coordinator.querying import rehearse_queries
+    from coordinator.training import train_model
+    from coordinator.truth import read_truth
+    from index.files import write_bytes
+    from index.models import write_model
+    from index.opened import OpenedIndex
+    from workers.stages.retrieve import KS
+
+    search = search_config("auto", "auto", vote, weights, descriptors, top=10)
+    opened = OpenedIndex(index.absolute())
+    queries = read_truth(truth, root, opened.catalogue.column("uri"))
+    with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
+        progress.begin("train", len(queries), 0)
+        answers = rehearse_queries(
+            opened, queries, search, KS, engine.follower, lambda: progress.advance("train")
+        )
+    model = train_model(answers, queries, opened, search, truth.absolute().parent.name)
+    if out is None:
+        write_model(opened.root, model)
+    else:
+        write_bytes(out.absolute(), model.to_json().encode())
+    unreadable = [answer for answer in answers if "error" in answer]
+    for answer in unreadable:
+        complain(f"{answer['query']}: {answer['error']}")
+    tell(model.summary())
+    return SOME_SKIPPED if unreadable else 0

@@ -1,0 +1,199 @@
+"""The demo: a town that Flaneur renders itself, old photos of it, and the truth about them."""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from coordinator.engine import Engine
+from coordinator.export.files import write_geojson
+from coordinator.export.page import write_page
+from coordinator.export.sheets import QuerySheet, SheetMatch
+from coordinator.indexing import IndexReport, Progress, run_job
+from coordinator.plan import make_plan, read_surveys
+from coordinator.querying import Located, locate_photos
+from geo.crs import ToWgs84
+from geo.frames import LocalMetres
+from geo.geojson import feature_collection
+from index.opened import OpenedIndex
+from survey import ReadOptions, decode_image
+from survey.synthetic import DemoQuery, DemoSurvey, render_survey
+
+CONFIG = IndexConfig(
+    features=FeatureConfig(max_frames=600, max_side_px=800),
+    codebooks=CodebookConfig(max_words=4000),
+)
+SHARD_SIZE = 8
+RIGHT_WITHIN_M = 25.0
+THUMBNAIL_PX = 240
+SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """One way's answer to one query. metres : None where it gave no place."""
+
+    detectors: tuple[str, ...]
+    k: int
+    metres: float | None
+    right_facade: bool
+
+    @property
+    def right(self) -> bool:
+        return self.right_facade and self.metres is not None and self.metres <= RIGHT_WITHIN_M
+
+
+@dataclass(frozen=True, slots=True)
+class DemoRow:
+    """One query: what Flaneur, a bag of words and chance made of it."""
+
+    query: DemoQuery
+    flaneur: Answer
+    plain: Answer
+    chance: Answer
+
+
+@dataclass(frozen=True, slots=True)
+class DemoReport:
+    """All of a demo. page, geojson : what was written."""
+
+    index: IndexReport
+    rows: tuple[DemoRow, ...]
+    seconds_per_photo: float
+    page: Path
+    geojson: Path
+
+
+def run_demo(out: Path, engine: Engine, progress: Progress) -> DemoReport:
+    """Render, index, locate, compare with the truth, and write the results."""
+    progress.begin("render", 1, 0)
+    demo = render_survey(out)
+    progress.advance("render")
+    intake = read_surveys([("", demo.survey)], ReadOptions(crs=demo.crs))
+    root = (out / "index").absolute()
+    job, plan = make_plan(root, intake, CONFIG, SHARD_SIZE)
+    report = run_job(job, plan, intake, nullcontext(engine), progress)
+    index = OpenedIndex(root)
+    photos = [str(demo.queries / query.file) for query in demo.truth]
+    search = SearchConfig()
+    progress.begin("locate", 2 * len(photos), 0)
+
+    def advance() -> None:
+        progress.advance("locate")
+
+    fused = locate_photos(index, photos, search, engine.follower, advance)
+    plain = locate_photos(index, photos, search, engine.follower, advance, plain=True)
+    judge = _Judge(demo, index)
+    rows = tuple(
+        DemoRow(query, judge.answer(query, ours), judge.answer(query, theirs), judge.chance(query))
+        for query, ours, theirs in zip(demo.truth, fused, plain, strict=True)
+    )
+    features = [feature for located in fused for feature in located.features]
+    collection = feature_collection(features)
+    geojson = out / "results.geojson"
+    write_geojson(geojson, collection)
+    page = out / "index.html"
+    write_page(
+        page.absolute(),
+        "Flaneur: old photos of a town that never was",
+        collection,
+        [judge.sheet(row, located) for row, located in zip(rows, fused, strict=True)],
+        attribution="Survey and photos rendered by Flaneur",
+        track=judge.track(),
+        truth={
+            photo: judge.lon_lat(query) for photo, query in zip(photos, demo.truth, strict=True)
+        },
+    )
+    seconds = float(np.mean([located.seconds for located in fused]))
+    return DemoReport(report, rows, seconds, page, geojson)
+
+
+class _Judge:
+    """Holds answers against the truth."""
+
+    def __init__(self, demo: DemoSurvey, index: OpenedIndex) -> None:
+        self._demo = demo
+        self._to_wgs84 = ToWgs84(demo.crs)
+        self._uris = index.catalogue.column("uri")
+        self._positions = index.catalogue.positions()
+        self._chance = np.random.default_rng(0)
+
+    def answer(self, query: DemoQuery, located: Located) -> Answer:
+        matches, estimates = located.of_kind("match"), located.of_kind("estimate")
+        if not matches or not estimates:
+            return Answer((), 0, None, False)
+        first: dict[str, Any] = matches[0]["properties"]
+        where = estimates[0]["geometry"]
+        return Answer(
+            tuple(first["detectors"]),
+            first["k"],
+            self._metres(query, *where["coordinates"]) if where else None,
+            self._sees(first["image"], query.facade),
+        )
+
+    def chance(self, query: DemoQuery) -> Answer:
+        """An image drawn at random is the answer."""
+        drawn = int(self._chance.integers(len(self._uris)))
+        easting, northing = self._positions[drawn]
+        metres = math.hypot(easting - query.easting, northing - query.northing)
+        return Answer((), 0, metres, self._sees(self._uris[drawn], query.facade))
+
+    def sheet(self, row: DemoRow, located: Located) -> QuerySheet:
+        """A query beside its matches, for the page."""
+        matches: list[dict[str, Any]] = [
+            each["properties"] for each in located.of_kind("match")[:SHOWN]
+        ]
+        return QuerySheet(
+            query=located.query,
+            photo_jpeg=_thumbnail(Path(located.query), THUMBNAIL_PX * 2),
+            style=row.query.style,
+            detectors=row.flaneur.detectors,
+            k=row.flaneur.k,
+            matches=tuple(
+                SheetMatch(
+                    image=match["image"],
+                    rank=match["rank"],
+                    score=match["score"],
+                    thumbnail_jpeg=_thumbnail(Path(match["uri"]), THUMBNAIL_PX),
+                    hit=self._sees(match["image"], row.query.facade),
+                )
+                for match in matches
+            ),
+            metres_from_truth=row.flaneur.metres,
+            right_facade=row.flaneur.right_facade,
+        )
+
+    def lon_lat(self, query: DemoQuery) -> tuple[float, float]:
+        lon, lat = self._to_wgs84.lon_lat(np.array([query.easting]), np.array([query.northing]))
+        return float(lon[0]), float(lat[0])
+
+    def track(self) -> list[tuple[float, float]]:
+        """Where the survey's images were taken."""
+        easting, northing = np.array(sorted(set(self._positions))).T
+        lon, lat = self._to_wgs84.lon_lat(easting, northing)
+        return list(zip(lon.tolist(), lat.tolist(), strict=True))
+
+    def _metres(self, query: DemoQuery, lon: float, lat: float) -> float:
+        frame = LocalMetres(*self.lon_lat(query))
+        east, north = frame.from_lon_lat(np.array([lon]), np.array([lat]))
+        return math.hypot(float(east[0]), float(north[0]))
+
+    def _sees(self, uri: str, facade: str) -> bool:
+        return facade in self._demo.facades_seen.get(uri, ())
+
+
+def _thumbnail(path: Path, side_px: int) -> bytes:
+    rgb = decode_image(path, max_side_px=side_px).rgb
+    _, encoded = cv2.imencode(".jpg", rgb[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])
+    return bytes(encoded)
+
+
+def share_right(rows: Sequence[DemoRow], way: Callable[[DemoRow], Answer]) -> int:
+    """How many queries a way answers within 25 m and on the right facade."""
+    return sum(way(row).right for row in rows)

@@ -1,0 +1,153 @@
+"""Following tasks: a bounded number in flight, lost ones sent again, the first failure told.
+
+What is done is read from receipts and results; what is lost is noticed by its lease.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, TypeVar
+
+from celery import Celery, states
+from celery.result import AsyncResult
+from redis import Redis, RedisError
+
+from contracts.errors import BrokerUnreachable, TaskFailed
+from workers.lease import EXPIRE_S, lease_key, starts_key
+
+T = TypeVar("T")
+
+POLL_S = 0.05
+LEASE_CHECK_S = 5.0
+OUTAGE_S = 60.0
+"""How long a server may be away before the job gives up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One task to send. name : 'extract', … key : what it is about, for messages and ids."""
+
+    name: str
+    key: str
+    message: dict[str, Any]
+
+
+@dataclass(slots=True)
+class _Flight:
+    order: Order
+    result: AsyncResult
+    sent_at: float = field(default_factory=time.monotonic)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came back of an order: `value`, or `error` where its task failed."""
+
+    order: Order
+    value: dict[str, Any] | None
+    error: str | None
+
+
+class Follower:
+    """Sends orders to the workers and yields what comes back, in the order of completion."""
+
+    def __init__(self, app: Celery, run_id: str, in_flight: int, watch: Callable[[], None]) -> None:
+        self._app = app
+        self._run_id = run_id
+        self._in_flight = in_flight
+        self._watch = watch
+        """Called at every poll; raises if the local workers have died."""
+        self._server: Redis = app.backend.client
+        self._server_run = self._server_run_id()
+
+    def outcomes(self, orders: Iterable[Order]) -> Iterator[Outcome]:
+        """Send `orders`, a bounded number at a time; memory is bounded by what is in flight."""
+        waiting = iter(orders)
+        flying: deque[_Flight] = deque()
+        exhausted = False
+        checked_at = time.monotonic()
+        while True:
+            while not exhausted and len(flying) < self._in_flight:
+                order = next(waiting, None)
+                if order is None:
+                    exhausted = True
+                else:
+                    flying.append(self._patiently(partial(self._send, order)))
+            if not flying:
+                return
+            landed = [flight for flight in flying if self._patiently(flight.result.ready)]
+            for flight in landed:
+                flying.remove(flight)
+                yield self._outcome(flight)
+            if landed:
+                continue
+            self._watch()
+            if time.monotonic() - checked_at > LEASE_CHECK_S:
+                self._patiently(lambda: self._send_lost(flying))
+                checked_at = time.monotonic()
+            time.sleep(POLL_S)
+
+    def results(self, orders: Iterable[Order]) -> Iterator[tuple[Order, dict[str, Any]]]:
+        """Like `outcomes`, but the first failed task ends it.
+
+        Raises
+        ------
+        TaskFailed : names the task and says why.
+        """
+        for outcome in self.outcomes(orders):
+            if outcome.value is None:
+                order = outcome.order
+                raise TaskFailed(f"{order.name} {order.key} failed: {outcome.error}")
+            yield outcome.order, outcome.value
+
+    def _send(self, order: Order) -> _Flight:
+        task_id = f"{self._run_id}.{order.name}.{order.key}"
+        result = self._app.send_task(
+            f"flaneur.{order.name}", args=[order.message], task_id=task_id, retry=False
+        )
+        return _Flight(order, result)
+
+    def _outcome(self, flight: _Flight) -> Outcome:
+        state = self._patiently(lambda: flight.result.state)
+        value = self._patiently(lambda: flight.result.result)
+        self._patiently(flight.result.forget)
+        if state == states.SUCCESS:
+            return Outcome(flight.order, value, None)
+        return Outcome(flight.order, None, f"{type(value).__name__}: {value}")
+
+    def _send_lost(self, flying: Iterable[_Flight]) -> None:
+        """Send again what was begun and is held no longer, and all if the server lost its data."""
+        server_run = self._server_run_id()
+        restarted = server_run != self._server_run
+        self._server_run = server_run
+        now = time.monotonic()
+        for flight in flying:
+            task_id = flight.result.id
+            begun = self._server.exists(starts_key(task_id))
+            held = self._server.exists(lease_key(task_id))
+            gone = begun and not held and now - flight.sent_at > EXPIRE_S
+            if (gone or (restarted and not held)) and not flight.result.ready():
+                self._send(flight.order)
+                flight.sent_at = now
+
+    def _server_run_id(self) -> str:
+        info: dict[str, Any] = self._server.info("server")
+        return str(info.get("run_id"))
+
+    def _patiently(self, call: Callable[[], T]) -> T:
+        """Call the server, waiting while it restarts."""
+        gives_up_at = time.monotonic() + OUTAGE_S
+        while True:
+            try:
+                return call()
+            except (RedisError, ConnectionError, OSError) as error:
+                self._watch()
+                if time.monotonic() > gives_up_at:
+                    raise BrokerUnreachable(
+                        f"The broker went away and did not come back in {OUTAGE_S:.0f} s "
+                        f"({error}). Run the same command again once it is up: "
+                        "what is done stays done."
+                    ) from error
+                time.sleep(0.5)

@@ -1,0 +1,144 @@
+"""Querying: photos become tasks on the locate queue, and results in the order asked."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from contracts.config import SearchConfig
+from contracts.errors import TaskFailed
+from coordinator.follow import Follower, Order
+from coordinator.truth import JudgedQuery
+from geo.geojson import Feature, Kind, error_feature
+from index.opened import OpenedIndex
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """One photo's answer: its GeoJSON features, and the seconds a warm worker took."""
+
+    query: str
+    features: tuple[Feature, ...]
+    seconds: float
+
+    def of_kind(self, kind: Kind) -> list[Feature]:
+        """The features of one kind, best first."""
+        return [each for each in self.features if each["properties"]["kind"] == kind]
+
+    @property
+    def error(self) -> str | None:
+        """What was wrong with the photo."""
+        return next((str(each["properties"]["error"]) for each in self.of_kind("error")), None)
+
+    @property
+    def not_chosen(self) -> set[str]:
+        """How the search was settled where no model chose it: a person should know."""
+        choices = {str(each["properties"]["choice"]) for each in self.of_kind("match")}
+        return {choice for choice in choices if choice.startswith(("default", "fallback"))}
+
+
+def locate_photos(
+    index: OpenedIndex,
+    photos: Sequence[str],
+    search: SearchConfig,
+    follower: Follower,
+    advance: Callable[[], None],
+    *,
+    plain: bool = False,
+) -> list[Located]:
+    """Locate photos as a batch; one that fails becomes an error feature and stops no other.
+
+    plain : by the baseline, a bag of words.
+    """
+    verb = "plain" if plain else "fused"
+    orders = (
+        Order(
+            "locate",
+            f"{verb}-{number}",
+            {**_message(index, photo, Path(photo), search), "plain": plain},
+        )
+        for number, photo in enumerate(photos)
+    )
+    answers: dict[int, Located] = {}
+    for outcome in follower.outcomes(orders):
+        number = int(outcome.order.key.removeprefix(f"{verb}-"))
+        query = photos[number]
+        if outcome.value is None:
+            features = (error_feature(query, str(outcome.error)),)
+            answers[number] = Located(query, features, 0.0)
+        else:
+            answers[number] = Located(
+                query, tuple(outcome.value["features"]), outcome.value["seconds"]
+            )
+        advance()
+    return [answers[number] for number in range(len(photos))]
+
+
+def judge_queries(
+    index: OpenedIndex,
+    queries: Sequence[JudgedQuery],
+    search: SearchConfig,
+    follower: Follower,
+    advance: Callable[[], None],
+) -> list[Json]:
+    """Have every query searched and its ranking judged; in the order given."""
+    orders = (
+        Order(
+            "judge",
+            str(number),
+            {**_message(index, each.query, each.path, search), "relevant": each.relevant},
+        )
+        for number, each in enumerate(queries)
+    )
+    return _in_order(follower, orders, advance)
+
+
+def rehearse_queries(
+    index: OpenedIndex,
+    queries: Sequence[JudgedQuery],
+    search: SearchConfig,
+    ks: Sequence[int],
+    follower: Follower,
+    advance: Callable[[], None],
+) -> list[Json]:
+    """Have every query searched with every pair of detectors and every k; in the order given."""
+    pairs = index.config.features.pairs()
+    orders = (
+        Order(
+            "rehearse",
+            str(number),
+            {
+                **_message(index, each.query, each.path, search),
+                "relevant": each.relevant,
+                "pairs": pairs,
+                "ks": list(ks),
+            },
+        )
+        for number, each in enumerate(queries)
+    )
+    return _in_order(follower, orders, advance)
+
+
+def _in_order(
+    follower: Follower, orders: Iterator[Order], advance: Callable[[], None]
+) -> list[Json]:
+    answers: dict[int, Json] = {}
+    for outcome in follower.outcomes(orders):
+        if outcome.value is None:
+            query = outcome.order.message["query"]
+            raise TaskFailed(f"{query} could not be searched for: {outcome.error}")
+        answers[int(outcome.order.key)] = outcome.value
+        advance()
+    return [answers[number] for number in sorted(answers)]
+
+
+def _message(index: OpenedIndex, query: str, path: Path, search: SearchConfig) -> Json:
+    return {
+        "index": str(index.root),
+        "generation": index.generation.number,
+        "query": query,
+        "path": str(path.absolute()),
+        "search": search.model_dump(mode="json"),
+    }

@@ -1,0 +1,235 @@
+"""Results as GeoJSON objects (RFC 7946): features, their collection, its text.
+
+Positions are WGS 84 longitude and latitude, 7 decimals (a centimetre), with a height only where
+it is ellipsoidal and known; there is no `crs` member; a match without pose has a null geometry.
+"""
+
+import hashlib
+import itertools
+import json
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NotRequired, TypedDict
+
+DECIMALS = 7
+_ANGLE_DECIMALS = 6
+
+Kind = Literal["match", "estimate", "error"]
+
+
+class Point(TypedDict):
+    """A GeoJSON position: longitude, latitude and perhaps an ellipsoidal height in metres."""
+
+    type: Literal["Point"]
+    coordinates: list[float]
+
+
+class Feature(TypedDict):
+    """A GeoJSON feature of ours; `properties` are those of its `kind`."""
+
+    type: Literal["Feature"]
+    id: str
+    geometry: Point | None
+    properties: dict[str, object]
+
+
+class FeatureCollection(TypedDict):
+    """A GeoJSON feature collection; no `bbox` when nothing has a place."""
+
+    type: Literal["FeatureCollection"]
+    bbox: NotRequired[list[float]]
+    features: list[Feature]
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedMatch:
+    """One match of a query with its camera's place. None, or NaN: not known.
+
+    `query` is the path as given, `image` the uri relative to its survey, `uri` one that can be
+    resolved. `heading_deg` is clockwise from true north, `pitch_deg` up positive, `roll_deg`
+    right side down positive. `choice` says how the detectors and k came to be. `height_m` is
+    ellipsoidal.
+    """
+
+    query: str
+    rank: int
+    score: float
+    image: str
+    uri: str
+    image_id: int
+    lon_deg: float | None
+    lat_deg: float | None
+    heading_deg: float | None
+    pitch_deg: float | None
+    roll_deg: float | None
+    hfov_deg: float | None
+    captured_at: str | None
+    detectors: Sequence[str]
+    k: int
+    predicted_map: float | None
+    generation: int
+    choice: str | None = None
+    height_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedEstimate:
+    """Where a query was probably taken; `support` matches agree within `radius_m` metres."""
+
+    query: str
+    lon_deg: float
+    lat_deg: float
+    radius_m: float
+    support: int
+    detectors: Sequence[str]
+    k: int
+    choice: str | None = None
+
+
+def match_feature(match: PlacedMatch) -> Feature:
+    """The feature of one match.
+
+    Raises
+    ------
+    ValueError : the position lies outside longitude [-180, 180] or latitude [-90, 90].
+    """
+    properties: dict[str, object] = {
+        "kind": "match",
+        "query": match.query,
+        "rank": int(match.rank),
+        "score": float(match.score),
+        "image": match.image,
+        "uri": match.uri,
+        "image_id": int(match.image_id),
+        "heading_deg": _heading(match.heading_deg),
+        "pitch_deg": _angle(match.pitch_deg),
+        "roll_deg": _angle(match.roll_deg),
+        "hfov_deg": _angle(match.hfov_deg),
+        "captured_at": match.captured_at,
+        "detectors": list(match.detectors),
+        "k": int(match.k),
+        "predicted_map": _known(match.predicted_map),
+        "choice": match.choice,
+        "generation": int(match.generation),
+    }
+    geometry = _point(match.lon_deg, match.lat_deg, match.height_m)
+    return _feature(match.query, "match", int(match.rank), geometry, properties)
+
+
+def estimate_feature(estimate: PlacedEstimate) -> Feature:
+    """The feature of one query's estimated place.
+
+    Raises
+    ------
+    ValueError : there is no position, or one outside longitude [-180, 180] or latitude [-90, 90].
+    """
+    geometry = _point(estimate.lon_deg, estimate.lat_deg, None)
+    if geometry is None:
+        raise ValueError(f"the estimate of {estimate.query!r} has no position; leave it out")
+    properties: dict[str, object] = {
+        "kind": "estimate",
+        "query": estimate.query,
+        "radius_m": round(float(estimate.radius_m), 2),
+        "support": int(estimate.support),
+        "detectors": list(estimate.detectors),
+        "k": int(estimate.k),
+        "choice": estimate.choice,
+    }
+    return _feature(estimate.query, "estimate", 0, geometry, properties)
+
+
+def error_feature(query: str, message: str) -> Feature:
+    """The feature of a query that could not be located: no place, and the reason."""
+    properties: dict[str, object] = {"kind": "error", "query": query, "error": message}
+    return _feature(query, "error", 0, None, properties)
+
+
+def feature_collection(features: Iterable[Feature]) -> FeatureCollection:
+    """All features in the order given, with the smallest `bbox` around those that have a place.
+
+    Across longitude 180 the box's west is greater than its east (RFC 7946, section 5.2).
+    """
+    listed = list(features)
+    places = [
+        feature["geometry"]["coordinates"] for feature in listed if feature["geometry"] is not None
+    ]
+    if not places:
+        return {"type": "FeatureCollection", "features": listed}
+    west, east = _narrowest_span([place[0] for place in places])
+    south, north = min(place[1] for place in places), max(place[1] for place in places)
+    return {
+        "type": "FeatureCollection",
+        "bbox": [west, south, east, north],
+        "features": listed,
+    }
+
+
+def dumps(collection: FeatureCollection) -> str:
+    """The collection as compact JSON that can always be written as UTF-8.
+
+    A byte of a file name that is not UTF-8 (a lone surrogate in Python) is written as its JSON
+    escape, from which Python reads the same name again.
+
+    Raises
+    ------
+    ValueError : a number is NaN or infinite; RFC 8259 has no way to write it.
+    """
+    text = json.dumps(collection, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    return re.sub(r"[\ud800-\udfff]", lambda found: f"\\u{ord(found.group()):04x}", text)
+
+
+def _feature(
+    query: str, kind: Kind, rank: int, geometry: Point | None, properties: dict[str, object]
+) -> Feature:
+    name = json.dumps([query, kind, rank])
+    return {
+        "type": "Feature",
+        "id": hashlib.sha256(name.encode()).hexdigest()[:32],
+        "geometry": geometry,
+        "properties": properties,
+    }
+
+
+def _point(lon_deg: float | None, lat_deg: float | None, height_m: float | None) -> Point | None:
+    lon, lat, height = _known(lon_deg), _known(lat_deg), _known(height_m)
+    if lon is None or lat is None:
+        return None
+    if not (-180.0 <= lon <= 180.0 and -90.0 <= lat <= 90.0):
+        raise ValueError(
+            f"longitude {lon}, latitude {lat} is no place in WGS 84 degrees; "
+            "convert the survey's coordinates first (geo.crs.ToWgs84)"
+        )
+    # Adding zero turns -0.0 into 0.0, so that equal places read the same.
+    place = [round(lon, DECIMALS) + 0.0, round(lat, DECIMALS) + 0.0]
+    return {"type": "Point", "coordinates": place if height is None else [*place, round(height, 3)]}
+
+
+def _known(value: float | None) -> float | None:
+    """The number, or None for the NaN by which arrays say that there is none."""
+    return None if value is None or math.isnan(value) else float(value)
+
+
+def _angle(angle_deg: float | None) -> float | None:
+    known = _known(angle_deg)
+    return None if known is None else round(known, _ANGLE_DECIMALS) + 0.0
+
+
+def _heading(heading_deg: float | None) -> float | None:
+    rounded = _angle(heading_deg)
+    # Rounding can reach the whole turn.
+    return None if rounded is None else rounded % 360.0
+
+
+def _narrowest_span(lons_deg: Sequence[float]) -> tuple[float, float]:
+    """West and east of the shortest arc that holds every longitude."""
+    lons = sorted(set(lons_deg))
+    outer_gap = lons[0] + 360.0 - lons[-1]
+    inner_gap, after = max(
+        ((right - left, right) for left, right in itertools.pairwise(lons)),
+        default=(0.0, lons[0]),
+    )
+    if inner_gap <= outer_gap:
+        return lons[0], lons[-1]
+    return after, lons[lons.index(after) - 1]

@@ -1,0 +1,36 @@
+"""The adaptive choice on disk: an index's own model, or the one that Flaneur ships."""
+
+from importlib import resources
+from pathlib import Path
+
+from contracts.errors import BadIndex
+from index.files import write_bytes
+from retrieval.choice import ChoiceModel
+
+_SHIPPED = "default_choice.json"
+
+
+def model_path(root: Path) -> Path:
+    """Where `flaneur train` puts an index's own model."""
+    return root / "models" / "choice.json"
+
+
+def read_model(root: Path) -> ChoiceModel | None:
+    """The index's own model, else the shipped one, else None.
+
+    Raises
+    ------
+    BadIndex : there is a model and it does not hold.
+    """
+    path = model_path(root)
+    try:
+        if path.is_file():
+            return ChoiceModel.from_json(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadIndex(f"{path} cannot be read ({error}). Run `flaneur train` again.") from error
+    shipped = resources.files("index") / _SHIPPED
+    return ChoiceModel.from_json(shipped.read_text(encoding="utf-8")) if shipped.is_file() else None
+
+
+def write_model(root: Path, model: ChoiceModel) -> None:
+    write_bytes(model_path(root), model.to_json().encode())

@@ -1,0 +1,97 @@
+"""An index opened for searching: everything mapped, nothing loaded before it is asked for."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contracts.config import IndexConfig
+from contracts.errors import BadConfig, BadIndex
+from contracts.records import Postings
+from index.catalogue import Catalogue
+from index.codebooks import codebook_paths, read_searcher
+from index.files import map_array
+from index.manifest import Generation, live_generation
+from index.segments import map_postings, segment_paths
+from retrieval.codebooks import WordSearcher
+from retrieval.postings import document_frequency
+
+
+class OpenedIndex:
+    """One generation of an index; later commits do not touch what it reads.
+
+    Raises
+    ------
+    BadIndex : not an index, a later format, or files missing or of another size than written.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.generation: Generation = live_generation(root)
+        for name, entry in self.generation.files.items():
+            path = root / name
+            if not path.is_file() or path.stat().st_size != entry.size:
+                raise BadIndex(
+                    f"{path} is missing or not {entry.size} bytes long. Restore it or index again."
+                )
+        self._searchers: dict[str, WordSearcher] = {}
+        self._postings: dict[str, Postings] = {}
+        self._idf: dict[str, NDArray[np.float64]] = {}
+
+    @property
+    def config(self) -> IndexConfig:
+        return self.generation.config
+
+    @property
+    def n_images(self) -> int:
+        return self.generation.n_images
+
+    @cached_property
+    def catalogue(self) -> Catalogue:
+        return Catalogue(self.root / "catalogue" / f"{self.generation.segment}.parquet")
+
+    def searcher(self, channel: str) -> WordSearcher:
+        """The nearest-word search of a channel."""
+        if channel not in self._searchers:
+            self._check(channel)
+            paths = codebook_paths(self.root, self.generation.segment, channel)
+            name = paths["search"].relative_to(self.root).as_posix()
+            self._searchers[channel] = read_searcher(paths, self.generation.files[name].sha256)
+        return self._searchers[channel]
+
+    def postings(self, channel: str) -> Postings:
+        """The inverted index of a channel, memory-mapped."""
+        if channel not in self._postings:
+            self._check(channel)
+            indptr, ids, _ = segment_paths(self.root, self.generation.segment, channel)
+            self._postings[channel] = map_postings(indptr, ids)
+        return self._postings[channel]
+
+    def idf(self, channel: str) -> NDArray[np.float64]:
+        """ln(N / df) of each word, 0 for a word in no image; (V,)."""
+        if channel not in self._idf:
+            frequency = document_frequency(self.postings(channel))
+            self._idf[channel] = np.log(self.n_images / np.maximum(frequency, 1)) * (frequency > 0)
+        return self._idf[channel]
+
+    def distinct_words(self, channels: Sequence[str]) -> NDArray[np.int64]:
+        """Distinct words of each image summed over `channels`; (n_images,)."""
+        total = np.zeros(self.n_images, dtype=np.int64)
+        for channel in channels:
+            self._check(channel)
+            path = segment_paths(self.root, self.generation.segment, channel)[2]
+            total += map_array(path, np.uint32, 1).astype(np.int64)
+        return total
+
+    def bytes_on_disk(self) -> int:
+        return sum(entry.size for entry in self.generation.files.values())
+
+    def _check(self, channel: str) -> None:
+        channels = self.config.features.channels()
+        if channel not in channels:
+            raise BadConfig(
+                f"{self.root} has no channel {channel!r}; it was indexed with "
+                f"{', '.join(channels)}. Choose from these or index again."
+            )

@@ -1,0 +1,122 @@
+"""K-means of byte descriptors: flat, and in two levels where flat would take minutes.
+
+The same points, number and seed give the same centres: one thread, one order of summing.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import faiss
+import numpy as np
+from numpy.typing import NDArray
+
+from retrieval.word_search import WordTable, exhaustive_index, list_index
+
+_ITERATIONS = 15
+_FLAT_WORK = 100_000_000
+"""Points times centres up to which flat k-means is used: some six seconds of one core."""
+
+_POINTS_PER_COARSE_CLUSTER = 256
+_REFINEMENTS = 3
+_REFINEMENT_PROBES = 8
+_SUM_BLOCK = 65_536
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let faiss use one thread: sums then come in one order."""
+    threads = faiss.omp_get_max_threads()
+    faiss.omp_set_num_threads(1)
+    try:
+        yield
+    finally:
+        faiss.omp_set_num_threads(threads)
+
+
+def kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArray[np.uint8]:
+    """Find (n_clusters, D) whole-number centres of (n, D) points, flat or in two levels."""
+    if len(points) * n_clusters <= _FLAT_WORK:
+        return flat_kmeans(points, n_clusters, seed)
+    return two_level_kmeans(points, n_clusters, seed)
+
+
+def flat_kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArray[np.uint8]:
+    """Lloyd's k-means on all of the (n, D) points; (n_clusters, D) whole-number centres.
+
+    n_clusters is at least 1 and at most n.
+    """
+    clustering = faiss.Kmeans(
+        points.shape[1],
+        n_clusters,
+        niter=_ITERATIONS,
+        seed=seed,
+        min_points_per_centroid=1,
+        max_points_per_centroid=len(points),
+    )
+    with one_thread():
+        clustering.train(points.astype(np.float32))
+    centres = np.asarray(clustering.centroids, dtype=np.float32)
+    return np.clip(np.rint(centres), 0, 255).astype(np.uint8)
+
+
+def two_level_kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArray[np.uint8]:
+    """About sqrt(n_clusters) coarse clusters, each one's share of centres within it, then mend.
+
+    Three Lloyd steps over all points let centres cross the borders of the coarse clusters.
+    """
+    n_coarse = round(np.sqrt(n_clusters))
+    coarse = flat_kmeans(points[: n_coarse * _POINTS_PER_COARSE_CLUSTER], n_coarse, seed)
+    with one_thread():
+        nearest = WordTable(exhaustive_index(coarse)).nearest(points, 1)[0][:, 0]
+    sizes = np.bincount(nearest, minlength=n_coarse)
+    members = np.split(np.argsort(nearest, kind="stable"), np.cumsum(sizes)[:-1])
+    centres = np.concatenate(
+        [
+            flat_kmeans(points[rows], int(share), seed + 1 + cluster)
+            for cluster, (rows, share) in enumerate(
+                zip(members, share_out(n_clusters, sizes), strict=True)
+            )
+            if share
+        ]
+    )
+    for _ in range(_REFINEMENTS):
+        centres = _lloyd_step(points, centres, coarse)
+    return centres
+
+
+def _lloyd_step(
+    points: NDArray[np.uint8], centres: NDArray[np.uint8], coarse: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Move each centre to the rounded mean of the points that find it; one without stays."""
+    with one_thread():
+        table = WordTable(list_index(centres, coarse), _REFINEMENT_PROBES)
+        nearest = table.nearest(points, 1)[0][:, 0]
+    sums = np.zeros(centres.shape, dtype=np.int64)
+    for start in range(0, len(points), _SUM_BLOCK):
+        block = nearest[start : start + _SUM_BLOCK]
+        order = np.argsort(block, kind="stable")
+        found, first = np.unique(block[order], return_index=True)
+        members = points[start : start + _SUM_BLOCK][order]
+        sums[found] += np.add.reduceat(members, first, axis=0, dtype=np.int64)
+    sizes = np.bincount(nearest, minlength=len(centres))
+    moved = centres.copy()
+    used = sizes > 0
+    moved[used] = np.rint(sums[used] / sizes[used, None])
+    return moved
+
+
+def share_out(n_shares: int, sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Divide shares by size: at least 1 if not empty, at most a cluster's size; (C,) int64.
+
+    n_shares lies between the number of clusters that are not empty and the sum of sizes.
+    Largest remainders first get what rounding leaves; ties go to the earlier cluster.
+    """
+    quota: NDArray[np.float64] = n_shares * sizes / sizes.sum()
+    shares: NDArray[np.int64] = np.maximum(np.floor(quota).astype(np.int64), sizes > 0)
+    neediest = np.argsort(shares - quota, kind="stable")
+    while (missing := n_shares - int(shares.sum())) > 0:
+        shares[neediest[shares[neediest] < sizes[neediest]][:missing]] += 1
+    while (excess := int(shares.sum()) - n_shares) > 0:
+        richest = neediest[::-1]
+        shares[richest[shares[richest] > 1][:excess]] -= 1
+    return shares

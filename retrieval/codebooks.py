@@ -1,0 +1,225 @@
+"""Visual words: sampling descriptors whatever the shards, training words, finding the nearest.
+
+Descriptors and words are uint8, so that every squared distance is a whole number below 2**24,
+exact in float32: see docs/decisions/0002-integer-descriptors-and-words.md.
+"""
+
+from dataclasses import dataclass
+
+import faiss
+import numpy as np
+from numpy.typing import NDArray
+
+from contracts.config import MAX_NEIGHBOURS, CodebookConfig
+from contracts.errors import VocabularyMismatch, WrongInput
+from retrieval.clustering import flat_kmeans, kmeans, one_thread
+from retrieval.word_search import WordTable, exhaustive_index, list_index
+
+_EXHAUSTIVE_WORDS = 4_096
+"""Up to here a descriptor is compared with every word; above, with those of the nearest lists."""
+
+_LISTS_PER_ROOT_WORD = 3.5
+"""Lists of the search structure, as a multiple of sqrt(V); measured at 20,000 words."""
+
+_DISTANCE_SAMPLE = 10_000
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+
+
+@dataclass(frozen=True, slots=True)
+class Codebook:
+    """The visual words of one channel, and the distances that scale its votes.
+
+    words : (V, D) uint8. dmin : smallest squared distance of a sample point to its nearest word.
+    dmax : (MAX_NEIGHBOURS,) float32, at k-1 the largest squared distance to the k-th nearest.
+    """
+
+    words: NDArray[np.uint8]
+    dmin: float
+    dmax: NDArray[np.float32]
+
+
+class WordSearcher:
+    """Finds the nearest words of descriptors, the same for any batch, order or machine.
+
+    Parameters
+    ----------
+    codebook : the words.
+    index : what `build_search` gave for them, perhaps stored in between.
+
+    Raises
+    ------
+    VocabularyMismatch : the index was built for other words.
+    """
+
+    def __init__(self, codebook: Codebook, index: faiss.Index) -> None:
+        n_words, dimensions = codebook.words.shape
+        self.codebook = codebook
+        self._table = WordTable(index)
+        if index.ntotal != n_words or self._table.dimensions < dimensions:
+            raise VocabularyMismatch(
+                f"a search structure of {index.ntotal} words in {index.d} dimensions was opened "
+                f"for a codebook of {n_words} words in {dimensions}; build it from these words"
+            )
+
+    def nearest(
+        self, descriptors: NDArray[np.uint8], k: int
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Find the k nearest words, by (distance, word id).
+
+        Parameters
+        ----------
+        descriptors : (n, D) uint8.
+        k : at least 1; k' = min(k, V) words are given.
+
+        Returns
+        -------
+        word_ids : (n, k') int32. sq_dist : (n, k') float32, squared L2.
+
+        Raises
+        ------
+        VocabularyMismatch : the descriptors have not the words' dimension.
+        """
+        n_words, dimensions = self.codebook.words.shape
+        if descriptors.ndim != 2 or descriptors.shape[1] != dimensions:
+            raise VocabularyMismatch(
+                f"descriptors of shape {descriptors.shape} were looked up among words of "
+                f"{dimensions} dimensions; describe with the index's own settings"
+            )
+        return self._table.nearest(descriptors, min(k, n_words))
+
+
+class SampleReservoir:
+    """Keeps the `max_points` descriptors of the smallest keys, in bounded memory.
+
+    What it keeps does not depend on the order, or the portions, of what it is offered.
+    """
+
+    def __init__(self, max_points: int) -> None:
+        self._max_points = max_points
+        self._keys: list[NDArray[np.uint64]] = []
+        self._descriptors: list[NDArray[np.uint8]] = []
+        self._n_held = 0
+        self._largest_of_use = np.uint64(2**64 - 1)
+
+    def offer(self, keys: NDArray[np.uint64], descriptors: NDArray[np.uint8]) -> None:
+        """Take in (n,) uint64 keys and their (n, D) uint8 descriptors.
+
+        Raises
+        ------
+        WrongInput : not one key per descriptor.
+        """
+        if len(keys) != len(descriptors):
+            raise WrongInput(f"{len(keys)} sample keys were offered for {len(descriptors)} points")
+        wanted = keys <= self._largest_of_use
+        self._keys.append(keys[wanted])
+        self._descriptors.append(descriptors[wanted])
+        self._n_held += int(wanted.sum())
+        if self._n_held > 2 * self._max_points:
+            self._shrink()
+
+    def sample(self) -> NDArray[np.uint8]:
+        """Give the sample by ascending key, then descriptor bytes; (n, D) uint8.
+
+        Raises
+        ------
+        WrongInput : nothing was ever offered, not even an empty array of the right width.
+        """
+        if not self._descriptors:
+            raise WrongInput("no descriptors were offered to sample from; extract features first")
+        self._shrink()
+        return self._descriptors[0]
+
+    def _shrink(self) -> None:
+        keys, descriptors = np.concatenate(self._keys), np.concatenate(self._descriptors)
+        order = np.argsort(keys, kind="stable")
+        keys, descriptors = keys[order], descriptors[order]
+        repeats = np.flatnonzero(np.diff(keys) == 0)
+        tied = np.union1d(repeats, repeats + 1)
+        descriptors[tied] = descriptors[tied[np.lexsort((*descriptors[tied].T[::-1], keys[tied]))]]
+        self._keys = [keys[: self._max_points].copy()]
+        self._descriptors = [descriptors[: self._max_points].copy()]
+        self._n_held = len(self._keys[0])
+        if self._n_held == self._max_points:
+            self._largest_of_use = self._keys[0][-1]
+
+
+def sample_keys(image_sha256: str, n_frames: int, seed: int) -> NDArray[np.uint64]:
+    """Hash each frame of an image for sampling; (n_frames,) uint64.
+
+    splitmix64 (Steele, Lea & Flood 2014) started at the first 8 bytes of the image's sha256,
+    mixed with the seed. It knows nothing of shards, so neither does the sample.
+
+    Raises
+    ------
+    WrongInput : not a hexadecimal digest of 8 bytes or more.
+    """
+    try:
+        head = int(image_sha256[:16], 16)
+    except ValueError:
+        head = -1
+    if head < 0 or len(image_sha256) < 16:
+        raise WrongInput(f"an image's sha256 must be hexadecimal; got {image_sha256!r}")
+    start = np.array([head], dtype=np.uint64) ^ _mixed(np.array([seed], dtype=np.uint64) + _GOLDEN)
+    return _mixed(_mixed(start) + np.arange(1, n_frames + 1, dtype=np.uint64) * _GOLDEN)
+
+
+def build_search(words: NDArray[np.uint8]) -> faiss.Index:
+    """Build the search structure of (V, D) uint8 words; `faiss.serialize_index` stores it."""
+    with one_thread():
+        if len(words) <= _EXHAUSTIVE_WORDS:
+            return exhaustive_index(words)
+        n_lists = round(_LISTS_PER_ROOT_WORD * np.sqrt(len(words)))
+        return list_index(words, flat_kmeans(words, n_lists, seed=0))
+
+
+def n_words_for(n_points: int, config: CodebookConfig) -> int:
+    """Size a codebook for a channel with `n_points` descriptors (METHOD section 2)."""
+    wanted = max(round(config.codebook_ratio * n_points), 1)
+    return min(wanted, config.max_words, config.max_train_points, n_points)
+
+
+def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebook:
+    """Make words by k-means; the same sample, number and seed give the same words.
+
+    Words equal after rounding are kept once, so fewer than `n_words` may come back.
+    A channel in which the survey has no descriptor gets a codebook without words.
+
+    Parameters
+    ----------
+    sample : (n, D) uint8, in canonical order, as `SampleReservoir.sample` gives it.
+    n_words : at most n.
+
+    Raises
+    ------
+    WrongInput : more words than points are asked, or none from points.
+    """
+    if n_words > len(sample) or (n_words < 1 and len(sample)):
+        raise WrongInput(
+            f"{n_words} words cannot be trained from {len(sample)} descriptors; "
+            "ask for at least one and at most as many as there are"
+        )
+    if not len(sample):
+        return Codebook(sample.copy(), 0.0, np.zeros(MAX_NEIGHBOURS, dtype=np.float32))
+    words = np.unique(kmeans(sample, n_words, seed), axis=0)
+    return Codebook(words, *_distance_range(sample[:_DISTANCE_SAMPLE], words))
+
+
+def _mixed(state: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Finish splitmix64; whole numbers wrap at 2**64."""
+    state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return state ^ (state >> np.uint64(31))
+
+
+def _distance_range(
+    sample: NDArray[np.uint8], words: NDArray[np.uint8]
+) -> tuple[float, NDArray[np.float32]]:
+    """dmin and dmax of METHOD section 3, by exhaustive search; the last k stands in for more."""
+    width = min(MAX_NEIGHBOURS, len(words))
+    with one_thread():
+        _, sq_dist = WordTable(exhaustive_index(words)).nearest(sample, width)
+    dmax = np.empty(MAX_NEIGHBOURS, dtype=np.float32)
+    dmax[:width] = sq_dist.max(axis=0)
+    dmax[width:] = dmax[width - 1]
+    return float(sq_dist[:, 0].min()), dmax

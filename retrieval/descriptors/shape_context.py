@@ -1,0 +1,173 @@
+"""Local shape context: where the edges of a patch lie, and which way they run.
+
+Belongie, Malik & Puzicha, PAMI 2002; this small form Mikolajczyk & Schmid, PAMI 2005.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from retrieval.kernels import kernel
+from retrieval.patches import PATCH_SIDE, turns
+
+_SECTORS = 4
+_LOCATIONS = 1 + 2 * _SECTORS
+_ORIENTATIONS = 4
+_HALF = PATCH_SIDE // 2
+_RADII = (6.0 / 15.0, 11.0 / 15.0, 1.0)
+"""Outer radii of the centre and the two rings, over the patch's half-width."""
+_HIGH = 1.5
+_LOW = 0.6
+"""Canny's two thresholds over the patch's mean gradient magnitude."""
+_SCALE = 512.0
+
+
+@kernel
+def describe_shape_context(
+    magnitude: NDArray[np.float32], angle: NDArray[np.float32]
+) -> NDArray[np.uint8]:
+    """Shape context of patches: square root of the L1-normalised histogram, times 512, at most 255.
+
+    Canny edge points vote with their gradient magnitude for one of 9 locations (0 the centre;
+    1 + 4 ring + sector) and, linearly, for the two nearest of 4 edge orientations and of the 4
+    sectors: entry 4 location + orientation.
+
+    Parameters
+    ----------
+    magnitude, angle : (n, 41, 41) float32; angles in turns.
+
+    Returns
+    -------
+    (n, 36) uint8; zero for a flat patch.
+    """
+    n = len(magnitude)
+    out = np.zeros((n, _LOCATIONS * _ORIENTATIONS), np.uint8)
+    ring, sector = _locations()
+    edges = np.empty((PATCH_SIDE, PATCH_SIDE), np.uint8)
+    stack = np.empty((PATCH_SIDE * PATCH_SIDE, 2), np.int64)
+    histogram = np.empty((_LOCATIONS, _ORIENTATIONS), np.float64)
+    for i in range(n):
+        find_edges(magnitude[i], angle[i], edges, stack)
+        histogram[:] = 0.0
+        for row in range(2, PATCH_SIDE - 2):
+            for column in range(2, PATCH_SIDE - 2):
+                if edges[row, column] != 2 or ring[row, column] < 0:
+                    continue
+                _vote(
+                    histogram,
+                    float(magnitude[i, row, column]),
+                    float(angle[i, row, column]),
+                    ring[row, column],
+                    sector[row, column],
+                )
+        _quantise(histogram, out[i])
+    return out
+
+
+@kernel
+def _locations() -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Per pixel: ring (0 centre, -1 outside) and position among the sectors, 0 <= sector < 4."""
+    ring = np.full((PATCH_SIDE, PATCH_SIDE), -1, np.int64)
+    sector = np.zeros((PATCH_SIDE, PATCH_SIDE), np.float64)
+    for row in range(PATCH_SIDE):
+        for column in range(PATCH_SIDE):
+            x, y = column - _HALF, row - _HALF
+            radius = np.sqrt(x * x + y * y) / _HALF
+            sector[row, column] = _SECTORS * turns(np.float32(x), np.float32(y))
+            for k in range(3):
+                if radius <= _RADII[k]:
+                    ring[row, column] = k
+                    break
+    return ring, sector
+
+
+@kernel
+def find_edges(
+    magnitude: NDArray[np.float32],
+    angle: NDArray[np.float32],
+    edges: NDArray[np.uint8],
+    stack: NDArray[np.int64],
+) -> None:
+    """Canny's edges of one patch: 2 = edge, 1 = weak and unconnected, 0 = none.
+
+    Thresholds follow the patch's mean gradient magnitude, so that faint patches have edges too.
+
+    Parameters
+    ----------
+    magnitude, angle : (41, 41) float32. edges : (41, 41) uint8, written.
+    stack : (1681, 2) int64, scratch.
+    """
+    mean = 0.0
+    for row in range(PATCH_SIDE):
+        for column in range(PATCH_SIDE):
+            mean += magnitude[row, column]
+    mean /= PATCH_SIDE * PATCH_SIDE
+    edges[:] = 0
+    n_stack = 0
+    for row in range(2, PATCH_SIDE - 2):
+        for column in range(2, PATCH_SIDE - 2):
+            value = magnitude[row, column]
+            if value <= _LOW * mean or not _is_ridge(magnitude, angle, row, column):
+                continue
+            edges[row, column] = 1
+            if value > _HIGH * mean:
+                edges[row, column] = 2
+                stack[n_stack, 0], stack[n_stack, 1] = row, column
+                n_stack += 1
+    while n_stack > 0:
+        n_stack -= 1
+        row, column = stack[n_stack]
+        for down in range(-1, 2):
+            for right in range(-1, 2):
+                if edges[row + down, column + right] == 1:
+                    edges[row + down, column + right] = 2
+                    stack[n_stack, 0], stack[n_stack, 1] = row + down, column + right
+                    n_stack += 1
+
+
+@kernel
+def _is_ridge(
+    magnitude: NDArray[np.float32], angle: NDArray[np.float32], row: int, column: int
+) -> bool:
+    """Not weaker than the neighbours across the edge; of two equal ones the second is taken."""
+    octant = int(8.0 * angle[row, column] + 0.5) % 4
+    right = 0 if octant == 2 else 1
+    down = 0 if octant == 0 else (-1 if octant == 3 else 1)
+    value = magnitude[row, column]
+    return bool(
+        value >= magnitude[row - down, column - right]
+        and value > magnitude[row + down, column + right]
+    )
+
+
+@kernel
+def _vote(
+    histogram: NDArray[np.float64], weight: float, angle: float, ring: int, sector: float
+) -> None:
+    orientation = 2.0 * _ORIENTATIONS * angle
+    low = int(orientation)
+    part = orientation - low
+    first, second = low % _ORIENTATIONS, (low + 1) % _ORIENTATIONS
+    if ring == 0:
+        histogram[0, first] += weight * (1.0 - part)
+        histogram[0, second] += weight * part
+        return
+    begin = 1 + (ring - 1) * _SECTORS
+    here = int(sector) % _SECTORS
+    share = sector - int(sector)
+    for location, vote in (
+        (begin + here, weight * (1.0 - share)),
+        (begin + (here + 1) % _SECTORS, weight * share),
+    ):
+        histogram[location, first] += vote * (1.0 - part)
+        histogram[location, second] += vote * part
+
+
+@kernel
+def _quantise(histogram: NDArray[np.float64], out: NDArray[np.uint8]) -> None:
+    total = histogram.sum()
+    if total <= 0.0:
+        return
+    for location in range(_LOCATIONS):
+        for k in range(_ORIENTATIONS):
+            value = _SCALE * np.sqrt(histogram[location, k] / total)
+            out[location * _ORIENTATIONS + k] = min(int(value + 0.5), 255)

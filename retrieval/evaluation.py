@@ -1,0 +1,189 @@
+"""Scores of rankings against a ground truth: METHOD section 5."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contracts.config import Detector
+from contracts.errors import BadTruth
+
+Ranking = Sequence[int] | NDArray[np.int64]
+"""Image ids, best first."""
+
+
+@dataclass(frozen=True, slots=True)
+class QueryResult:
+    """How well one query was answered.
+
+    first_hit_rank : 1 = best, junk not counted; None if no relevant image was ranked.
+    detectors, k : what was used. seconds : wall time of the search.
+    """
+
+    query: str
+    ap: float
+    ap_10: float
+    first_hit_rank: int | None
+    n_relevant: int
+    detectors: tuple[Detector, ...]
+    k: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """Means over queries. n_excluded : queries without a relevant image, not in any mean."""
+
+    mean_ap: float
+    mean_ap_10: float
+    recall_1: float
+    recall_5: float
+    recall_10: float
+    mrr: float
+    seconds_per_query: float
+    n_queries: int
+    n_excluded: int
+
+    def as_json(self) -> dict[str, float | int]:
+        """Name the scores as `flaneur evaluate --json` prints them."""
+        return {
+            "mAP": self.mean_ap,
+            "mAP@10": self.mean_ap_10,
+            "R@1": self.recall_1,
+            "R@5": self.recall_5,
+            "R@10": self.recall_10,
+            "MRR": self.mrr,
+            "seconds_per_query": self.seconds_per_query,
+            "n_queries": self.n_queries,
+            "n_excluded": self.n_excluded,
+        }
+
+
+def average_precision(
+    ranking: Ranking, relevant: Collection[int], junk: Collection[int] = ()
+) -> float:
+    """AP as the Oxford and Paris buildings protocol computes it (Philbin et al., CVPR 2007).
+
+    The sum of (R_j - R_(j-1)) (P_j + P_(j-1)) / 2 with P_0 = 1, over the ranking without junk.
+
+    Parameters
+    ----------
+    ranking : image ids, best first; a relevant image missing from it counts as never found.
+    relevant : image ids that answer the query; one that is also junk does not.
+    junk : image ids taken out of the ranking: neither right nor wrong.
+
+    Raises
+    ------
+    BadTruth : no relevant image is left.
+    """
+    wanted = _wanted(relevant, junk)
+    return _area(_hits(ranking, wanted, junk), len(wanted))
+
+
+def ap_at_10(ranking: Ranking, relevant: Collection[int], junk: Collection[int] = ()) -> float:
+    """AP over the first ten, recall divided by min(10, number relevant).
+
+    Raises
+    ------
+    BadTruth : no relevant image is left.
+    """
+    wanted = _wanted(relevant, junk)
+    hits = [rank for rank in _hits(ranking, wanted, junk) if rank <= 10]
+    return _area(hits, min(10, len(wanted)))
+
+
+def first_hit_rank(
+    ranking: Ranking, relevant: Collection[int], junk: Collection[int] = ()
+) -> int | None:
+    """Rank of the best relevant image, 1 = best, junk not counted; None if none was ranked.
+
+    Raises
+    ------
+    BadTruth : no relevant image is left.
+    """
+    hits = _hits(ranking, _wanted(relevant, junk), junk)
+    return hits[0] if hits else None
+
+
+def judge(
+    query: str,
+    ranking: Ranking,
+    relevant: Collection[int],
+    junk: Collection[int],
+    detectors: tuple[Detector, ...],
+    k: int,
+    seconds: float,
+) -> QueryResult:
+    """Score one query's ranking.
+
+    Raises
+    ------
+    BadTruth : no relevant image is left.
+    """
+    wanted = _wanted(relevant, junk)
+    hits = _hits(ranking, wanted, junk)
+    return QueryResult(
+        query=query,
+        ap=_area(hits, len(wanted)),
+        ap_10=_area([rank for rank in hits if rank <= 10], min(10, len(wanted))),
+        first_hit_rank=hits[0] if hits else None,
+        n_relevant=len(wanted),
+        detectors=detectors,
+        k=k,
+        seconds=seconds,
+    )
+
+
+def summarise(results: Sequence[QueryResult], n_excluded: int = 0) -> Summary:
+    """Average over queries; R@n is the share of queries with a hit in the first n.
+
+    Raises
+    ------
+    BadTruth : there is no query.
+    """
+    if not results:
+        raise BadTruth(
+            f"no query with a relevant image is left to average ({n_excluded} were excluded); "
+            "check the ground truth"
+        )
+    n_queries = len(results)
+    firsts = [result.first_hit_rank for result in results if result.first_hit_rank is not None]
+    return Summary(
+        mean_ap=sum(result.ap for result in results) / n_queries,
+        mean_ap_10=sum(result.ap_10 for result in results) / n_queries,
+        recall_1=sum(rank <= 1 for rank in firsts) / n_queries,
+        recall_5=sum(rank <= 5 for rank in firsts) / n_queries,
+        recall_10=sum(rank <= 10 for rank in firsts) / n_queries,
+        mrr=sum(1 / rank for rank in firsts) / n_queries,
+        seconds_per_query=sum(result.seconds for result in results) / n_queries,
+        n_queries=n_queries,
+        n_excluded=n_excluded,
+    )
+
+
+def _wanted(relevant: Collection[int], junk: Collection[int]) -> set[int]:
+    wanted = set(relevant) - set(junk)
+    if not wanted:
+        raise BadTruth(
+            f"a query has {len(set(relevant))} relevant images, none of which is not junk; "
+            "AP needs at least one: exclude the query"
+        )
+    return wanted
+
+
+def _hits(ranking: Ranking, wanted: set[int], junk: Collection[int]) -> list[int]:
+    """Ranks, from 1 and without junk, at which wanted images stand."""
+    order = np.asarray(ranking, dtype=np.int64)
+    order = order[~np.isin(order, list(junk))]
+    hits: list[int] = (np.flatnonzero(np.isin(order, list(wanted))) + 1).tolist()
+    return hits
+
+
+def _area(hits: Sequence[int], n_relevant: int) -> float:
+    """Area under precision over recall; between hits recall stands still and adds nothing."""
+    area = 0.0
+    for found, rank in enumerate(hits):
+        before = found / (rank - 1) if rank > 1 else 1.0
+        area += (before + (found + 1) / rank) / 2 / n_relevant
+    return area

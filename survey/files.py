@@ -1,0 +1,100 @@
+"""The image files of a survey: found within its root and nowhere else."""
+
+import os
+import stat
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+
+from contracts.errors import BadSurvey
+from contracts.records import Skipped
+
+IMAGE_SUFFIXES = frozenset(
+    {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp", ".jp2", ".ppm", ".pgm"}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Image files under a root.
+
+    paths : local uri (relative to the root, NFC, with `/`) -> path that can be opened.
+    skipped : what looks like an image and cannot be one, or is not inside the root.
+    """
+
+    paths: dict[str, str]
+    skipped: tuple[Skipped, ...]
+
+
+def list_images(root: Path) -> Listing:
+    """Every regular file under `root` whose name ends like an image's.
+
+    Hidden files and folders (names with a leading dot) are not looked at. Symbolic links to
+    files are followed as long as they stay inside the root; links to folders inside it are not,
+    since their files are found where they are.
+
+    Raises
+    ------
+    BadSurvey : the root itself cannot be listed.
+    """
+    found: dict[str, str] = {}
+    skipped: list[Skipped] = []
+    real_root = os.path.realpath(root)
+    folders = [(str(root), "")]
+    while folders:
+        folder, prefix = folders.pop()
+        try:
+            entries = sorted(os.scandir(folder), key=lambda entry: os.fsencode(entry.name))
+        except OSError as error:
+            if not prefix:
+                raise BadSurvey(
+                    f"survey {root} cannot be listed: {error.strerror}; "
+                    "give a folder that this user may read"
+                ) from error
+            skipped.append(Skipped(prefix, f"folder cannot be listed: {error.strerror}"))
+            continue
+        for entry in entries:
+            if entry.name.startswith("."):
+                continue
+            uri = prefix + printable_uri(entry.name)
+            if entry.is_dir(follow_symlinks=False):
+                folders.append((entry.path, f"{uri}/"))
+                continue
+            reason = _unusable(entry, real_root)
+            if reason == "":
+                _add(found, skipped, uri, entry.path)
+            elif reason is not None:
+                skipped.append(Skipped(uri, reason))
+    return Listing(found, tuple(skipped))
+
+
+def printable_uri(text: str) -> str:
+    """NFC, with bytes that are not UTF-8 shown as U+FFFD so that the uri can be written."""
+    return unicodedata.normalize("NFC", os.fsencode(text).decode("utf-8", "replace"))
+
+
+def _unusable(entry: os.DirEntry[str], real_root: str) -> str | None:
+    """Why an entry is left out; "" if it is a good file, None if it is of no interest."""
+    is_image = os.path.splitext(entry.name)[1].lower() in IMAGE_SUFFIXES  # noqa: PTH122
+    linked = entry.is_symlink()
+    if not is_image and not (linked and entry.is_dir()):
+        return None
+    if linked:
+        target = os.path.realpath(entry.path)
+        if os.path.commonpath([real_root, target]) != real_root:
+            return "symbolic link leads out of the survey's folder; copy the file into it"
+    if not is_image:
+        return None
+    try:
+        mode = entry.stat().st_mode
+    except OSError as error:
+        return f"cannot be looked up: {error.strerror}"
+    return "" if stat.S_ISREG(mode) else "not a regular file"
+
+
+def _add(found: dict[str, str], skipped: list[Skipped], uri: str, path: str) -> None:
+    if uri in found:
+        reason = "another file's name is the same once written in Unicode NFC; rename one of them"
+        skipped.append(Skipped(uri, reason))
+        return
+    found[uri] = path

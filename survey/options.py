@@ -1,0 +1,109 @@
+"""How a survey is to be read, what comes out, and what a reader of one format is."""
+
+import fnmatch
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from contracts.config import North
+from contracts.records import PosedImage, Skipped
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """What the user says about a survey.
+
+    crs : coordinate system of a pose table; None: only degrees named lon/lat are taken.
+    north : which north headings count from; None: the format's own (each reader states it).
+    no_pose : read the images alone; unless `format` names a reader, poses and metadata are not
+        looked at, so neither are a survey's masks and the way it stores its images.
+    include, exclude : globs on uris (`NAME/` included), see `selector`.
+    format : a reader's name; None: recognised by content.
+    make_upright, use_masks : whether rotated storage is put upright, vehicle masks applied.
+    name : prefix `NAME/` of the uris of a further survey.
+    """
+
+    crs: str | None = None
+    north: North | None = None
+    no_pose: bool = False
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    format: str | None = None
+    make_upright: bool = True
+    use_masks: bool = True
+    name: str = ""
+
+    def uri(self, local_uri: str) -> str:
+        """The catalogue's uri of an image whose path within its survey is `local_uri`."""
+        return f"{self.name}/{local_uri}" if self.name else local_uri
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """A survey as read: its images in the order of the bytes of their uris.
+
+    crs : of every pose; None with `no_pose`. format : the reader's name. attribution : what the
+    data itself asks to be shown beside results, or "".
+    """
+
+    images: tuple[PosedImage, ...]
+    skipped: tuple[Skipped, ...]
+    crs: str | None
+    format: str
+    attribution: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What one reader found, with uris local to the survey, in any order."""
+
+    images: tuple[PosedImage, ...]
+    skipped: tuple[Skipped, ...]
+    crs: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """A survey format.
+
+    recognises : whether the path holds this format, by content, without reading images.
+    read : everything the path holds; `wanted` says which local uris are asked for, so that a
+        reader that must open images opens only those.
+    """
+
+    name: str
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path, ReadOptions, Callable[[str], bool]], Reading]
+
+
+def selector(options: ReadOptions) -> Callable[[str], bool]:
+    """Which local uris are asked for by `include` and `exclude`.
+
+    As in `fnmatch`, `*` also crosses `/`; `**/` also stands for no folder at all. A pattern
+    without `/` may match the file's name alone. Case counts.
+    """
+    include = [_compiled(pattern) for pattern in options.include]
+    exclude = [_compiled(pattern) for pattern in options.exclude]
+
+    def wanted(local_uri: str) -> bool:
+        uri = options.uri(local_uri)
+        if include and not any(matches(uri) for matches in include):
+            return False
+        return not any(matches(uri) for matches in exclude)
+
+    return wanted
+
+
+def _compiled(pattern: str) -> Callable[[str], bool]:
+    pieces = [fnmatch.translate(piece) for piece in pattern.split("**/")]
+    bodies = [piece.removeprefix("(?s:").removesuffix(")\\Z").removesuffix(")\\z") for piece in pieces]
+    expression = re.compile("(?:.*/)?".join(bodies), re.DOTALL)
+    by_name = "/" not in pattern
+
+    def matches(uri: str) -> bool:
+        if expression.fullmatch(uri):
+            return True
+        return by_name and expression.fullmatch(uri.rpartition("/")[2]) is not None
+
+    return matches

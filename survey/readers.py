@@ -1,0 +1,38 @@
+"""The survey formats, in the order in which they are tried. A new one is one more line."""
+
+from pathlib import Path
+
+from contracts.errors import BadConfig, BadSurvey
+from survey import exif, plain, stereopolis, table
+from survey.options import Reader, ReadOptions
+
+READERS: tuple[Reader, ...] = (
+    stereopolis.READER,
+    table.READER,
+    exif.READER,
+    plain.READER,
+)
+
+
+def choose_reader(path: Path, options: ReadOptions) -> Reader:
+    """The reader that `options.format` names, or the first that recognises the path.
+
+    Raises
+    ------
+    BadConfig : no reader of that name. BadSurvey : no reader knows the path.
+    """
+    names = ", ".join(reader.name for reader in READERS)
+    if options.format is not None:
+        for reader in READERS:
+            if reader.name == options.format:
+                return reader
+        raise BadConfig(f"survey format {options.format!r} is unknown; expected one of {names}")
+    if options.no_pose:
+        return plain.READER
+    for reader in READERS:
+        if reader.recognises(path):
+            return reader
+    raise BadSurvey(
+        f"{path} is no survey: expected a folder of images or a pose table "
+        f"(formats: {names}); name the format with --format if it is one"
+    )

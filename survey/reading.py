@@ -1,0 +1,116 @@
+"""Read a survey: choose the reader, check what it found, put it in order."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from contracts.errors import BadSurvey
+from contracts.records import Pose, PosedImage, Skipped
+from survey.options import Reading, ReadOptions, Survey, selector
+from survey.poses import crs_name, outside_area
+from survey.readers import choose_reader
+
+
+def read_survey(path: Path, options: ReadOptions) -> Survey:
+    """Every image of a survey, with its pose, in the order of the bytes of the uris.
+
+    The order and the content depend on the files alone, never on the order in which a file
+    system lists them.
+
+    Raises
+    ------
+    BadSurvey : nothing there, no image, no pose where poses are wanted, or metadata that does
+        not hold. UnknownCrs : coordinates whose system is missing or unknown. BadConfig :
+        `options.format` names no reader.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise BadSurvey(f"survey {path} does not exist; check the path")
+    if options.crs is not None:
+        crs_name(options.crs)
+    reader = choose_reader(path, options)
+    wanted = selector(options)
+    reading = reader.read(path, options, wanted)
+    if options.no_pose:
+        bare = tuple(replace(image, pose=None) for image in reading.images)
+        reading = replace(reading, images=bare, crs=None)
+    reading = _only(reading, wanted)
+    if reading.crs is not None:
+        reading = _inside_area(reading, path)
+    if not reading.images:
+        raise BadSurvey(_why_empty(path, reading.skipped, options))
+    return Survey(
+        images=tuple(sorted(map(_named(options), reading.images), key=_uri_bytes)),
+        skipped=_ordered(reading.skipped, options),
+        crs=reading.crs,
+        format=reader.name,
+    )
+
+
+def _only(reading: Reading, wanted: Callable[[str], bool]) -> Reading:
+    return replace(
+        reading,
+        images=tuple(image for image in reading.images if wanted(image.uri)),
+        skipped=tuple(skip for skip in reading.skipped if wanted(skip.uri)),
+    )
+
+
+def _inside_area(reading: Reading, path: Path) -> Reading:
+    """Leave out poses that lie far from where the coordinate system is used."""
+    crs, poses = reading.crs, [image.pose for image in reading.images]
+    known = [pose for pose in poses if pose is not None]
+    if crs is None or not known or len(known) != len(poses):
+        return reading
+    outside = outside_area(known, crs)
+    if not outside.any():
+        return reading
+    if outside.all():
+        raise BadSurvey(_all_outside(path, known[0], crs))
+    reason = "easting {:g}, northing {:g} lie far outside the area of use of {}"
+    skipped = tuple(
+        Skipped(reading.images[at].uri, reason.format(known[at].easting, known[at].northing, crs))
+        for at in np.flatnonzero(outside)
+    )
+    kept = tuple(image for image, out in zip(reading.images, outside, strict=True) if not out)
+    return replace(reading, images=kept, skipped=reading.skipped + skipped)
+
+
+def _all_outside(path: Path, first: Pose, crs: str) -> str:
+    return (
+        f"survey {path}: every pose lies far outside the area of use of {crs}; the first has "
+        f"easting (x) {first.easting:g}, northing (y) {first.northing:g}. Either x and y are "
+        "swapped or the coordinate system is another: mend the columns or give --crs"
+    )
+
+
+def _why_empty(path: Path, skipped: tuple[Skipped, ...], options: ReadOptions) -> str:
+    if skipped:
+        reasons = Counter(skip.reason for skip in skipped)
+        reason, count = reasons.most_common(1)[0]
+        return (
+            f"survey {path}: not one usable image; {len(skipped)} were skipped, {count} of them "
+            f"because: {reason} (first: {skipped[0].uri})"
+        )
+    if options.include or options.exclude:
+        return (
+            f"survey {path}: no image is left by --include {list(options.include)} and "
+            f"--exclude {list(options.exclude)}; globs are matched against the path within the "
+            "survey, such as 'images/*/*.jpg'"
+        )
+    return f"survey {path} is empty: no image in it or its folders (JPEG, PNG, TIFF, WebP...)"
+
+
+def _named(options: ReadOptions) -> Callable[[PosedImage], PosedImage]:
+    return lambda image: replace(image, uri=options.uri(image.uri))
+
+
+def _uri_bytes(image: PosedImage) -> bytes:
+    return image.uri.encode()
+
+
+def _ordered(skipped: Iterable[Skipped], options: ReadOptions) -> tuple[Skipped, ...]:
+    named = (Skipped(options.uri(skip.uri), skip.reason) for skip in skipped)
+    return tuple(sorted(named, key=lambda skip: (skip.uri.encode(), skip.reason)))

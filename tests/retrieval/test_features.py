@@ -1,0 +1,128 @@
+"""All channels of a photo together, on drawn and on real photos."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from picture_scenes import facade
+
+from contracts.config import DESCRIPTOR_SIZES, FeatureConfig
+from retrieval.features import Features, extract
+
+ROOT = Path(__file__).parents[2]
+DATA = Path(os.environ.get("FLANEUR_TEST_DATA", ROOT.parent / "shared" / "data"))
+
+
+def test_every_channel_is_described_frame_by_frame() -> None:
+    config = FeatureConfig(max_frames=50)
+    features = extract(facade(), None, config)
+    assert tuple(features.frames) == config.detectors
+    assert tuple(features.descriptors) == config.channels()
+    for channel, rows in features.descriptors.items():
+        detector, descriptor = channel.split("-")
+        n = len(features.frames[detector])  # type: ignore[index]
+        assert rows.shape == (n, DESCRIPTOR_SIZES[descriptor])  # type: ignore[index]
+        assert rows.dtype == np.uint8
+
+
+def test_only_what_is_configured_is_extracted() -> None:
+    config = FeatureConfig(detectors=("orb", "star"), descriptors=("sc",), max_frames=30)
+    assert list(extract(facade(), None, config).descriptors) == ["orb-sc", "star-sc"]
+
+
+def test_the_same_photo_gives_the_same_bytes() -> None:
+    config = FeatureConfig(max_frames=80)
+    first = extract(facade(), None, config)
+    extract(facade(seed=3), None, config)
+    second = extract(facade(), None, config)
+    for channel, rows in first.descriptors.items():
+        assert rows.tobytes() == second.descriptors[channel].tobytes()
+
+
+def test_a_blank_photo_has_no_features_and_is_no_error() -> None:
+    for shape in ((300, 400, 3), (1, 1, 3)):
+        features = extract(np.full(shape, 255, np.uint8), None, FeatureConfig())
+        assert {len(rows) for rows in features.descriptors.values()} == {0}
+
+
+def test_a_mask_holds_for_every_detector() -> None:
+    usable = np.zeros((360, 480), np.bool_)
+    usable[:, :240] = True
+    for frames in extract(facade(), usable, FeatureConfig(max_frames=100)).frames.values():
+        assert len(frames) > 20
+        assert (frames.xy[:, 0] < 240).all()
+
+
+_WARM = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from picture_scenes import facade
+from contracts.config import FeatureConfig
+from retrieval.features import compile_kernels, extract
+
+def compiled():
+    named = [(m, vars(m)) for n, m in sorted(sys.modules.items()) if n.startswith("retrieval.")]
+    return {
+        f"{module.__name__}.{key}": len(value.signatures)
+        for module, names in named
+        for key, value in names.items()
+        if hasattr(value, "signatures")
+    }
+
+compile_kernels()
+before = compiled()
+extract(facade(), np.ones((360, 480), np.bool_), FeatureConfig())
+extract(np.full((90, 90, 3), 9, np.uint8), None, FeatureConfig())
+assert compiled() == before, (before, compiled())
+print(sum(before.values()))
+"""
+
+
+def test_warming_up_compiles_all_that_a_photo_needs() -> None:
+    here = str(Path(__file__).parent)
+    done = subprocess.run(
+        [sys.executable, "-c", _WARM, here], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    # Three descriptors, two steps of patches and eight of the detectors, at least.
+    assert int(done.stdout) >= 13
+
+
+def _photo(name: str) -> NDArray[np.uint8]:
+    path = DATA / "kth-buildings" / name
+    if not path.exists():
+        pytest.skip(f"{path} is missing; set FLANEUR_TEST_DATA to the folder of real images")
+    bgr = cv2.imread(str(path))
+    assert bgr is not None
+    return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)
+
+
+def _ratio_matches(query: NDArray[np.uint8], reference: NDArray[np.uint8]) -> int:
+    a, b = query.astype(np.float64), reference.astype(np.float64)
+    squared = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
+    nearest = np.partition(squared, 1, axis=1)
+    return int((nearest[:, 0] < 0.8**2 * nearest[:, 1]).sum())
+
+
+@pytest.fixture(scope="module")
+def facades() -> tuple[Features, Features, Features]:
+    names = ("queries/obj10_t1.jpg", "references/obj10_1.jpg", "references/obj20_1.jpg")
+    photos = [_photo(name) for name in names]
+    query, same, other = (extract(photo, None, FeatureConfig()) for photo in photos)
+    return query, same, other
+
+
+@pytest.mark.parametrize("channel", FeatureConfig().channels())
+def test_a_facade_matches_itself_on_another_day_better_than_another_facade(
+    facades: tuple[Features, Features, Features], channel: str
+) -> None:
+    query, same, other = (features.descriptors[channel] for features in facades)
+    right, wrong = _ratio_matches(query, same), _ratio_matches(query, other)
+    assert right > 60
+    assert right > 2.5 * wrong

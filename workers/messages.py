@@ -1,0 +1,79 @@
+"""What may stand in a message: ids and paths, checked before anything is done with them."""
+
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from contracts.config import Detector, SearchConfig
+from contracts.errors import TaskFailed
+from index.jobs import JobFolder
+
+
+class Message(BaseModel):
+    """Base of all messages: unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @classmethod
+    def parse(cls, content: object) -> Self:
+        try:
+            return cls.model_validate(content)
+        except ValidationError as error:
+            raise TaskFailed(
+                f"A message for {cls.__name__} does not hold ({error.errors()[0]['msg']}). "
+                "Are coordinator and workers of the same version?"
+            ) from error
+
+
+class _JobMessage(Message):
+    index: str
+    job: Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+
+    def folder(self) -> JobFolder:
+        return JobFolder(Path(self.index), self.job)
+
+
+class ExtractMessage(_JobMessage):
+    shard: Annotated[int, Field(ge=0)]
+
+
+class TrainMessage(_JobMessage):
+    channel: str
+
+
+class AssignMessage(_JobMessage):
+    shard: Annotated[int, Field(ge=0)]
+    first_image_id: Annotated[int, Field(ge=0)]
+
+
+class MergeMessage(_JobMessage):
+    channel: str
+    n_images: Annotated[int, Field(ge=0)]
+
+
+class LocateMessage(Message):
+    """`query` is the photo's name as the user gave it, `path` where it is read.
+
+    plain : search by the baseline, a bag of words, instead.
+    """
+
+    index: str
+    generation: int
+    query: str
+    path: str
+    search: SearchConfig
+    plain: bool = False
+
+
+class JudgeMessage(LocateMessage):
+    """`relevant` : ids of the images that show the query's place."""
+
+    relevant: tuple[int, ...]
+
+
+class RehearseMessage(JudgeMessage):
+    """Every pair and k is tried, for training the choice."""
+
+    pairs: tuple[tuple[Detector, Detector], ...]
+    ks: tuple[int, ...]

@@ -1,0 +1,104 @@
+"""Extract: a shard's images, each decoded once, become one feature file."""
+
+import platform
+from pathlib import Path
+
+import faiss
+import numpy as np
+from numpy.typing import NDArray
+
+from contracts.config import DESCRIPTOR_SIZES, FeatureConfig
+from contracts.errors import UnusableImage
+from contracts.records import PosedImage, Receipt, Skipped
+from index.files import write_arrays
+from index.jobs import IndexedImage, JobFolder
+from retrieval.features import Features, extract
+from survey import DecodedImage, decode_image, decode_mask
+
+
+def instruction_set() -> str:
+    """What this process is compiled for; mixed jobs may differ in the last bit."""
+    return f"{platform.machine()} {faiss.get_compile_options().strip()}"
+
+
+def extract_shard(job: JobFolder, shard: int) -> Receipt:
+    """Write the shard's features; an image that cannot be read is recorded and passed over."""
+    config = job.read_plan().config.features
+    indexed: list[IndexedImage] = []
+    skipped: list[Skipped] = []
+    found: list[Features] = []
+    for row, image in enumerate(job.read_images(shard)):
+        try:
+            decoded, features = image_features(image, config)
+        except UnusableImage as error:
+            skipped.append(Skipped(image.uri, str(error)))
+            continue
+        indexed.append(IndexedImage(row, decoded.sha256, decoded.width_px, decoded.height_px))
+        found.append(features)
+    arrays = _columns(found, config)
+    path = job.features(shard)
+    outputs = {
+        job.relative(path): write_arrays(path, arrays),
+        job.relative(job.indexed_of_shard(shard)): job.write_indexed(shard, indexed),
+    }
+    frames = sum(int(arrays[f"{det}/counts"].sum()) for det in config.detectors)
+    blank = sum(1 for features in found if not any(map(len, features.frames.values())))
+    receipt = Receipt(
+        stage="extract",
+        key=f"{shard:06d}",
+        outputs=outputs,
+        counts={
+            "images": len(indexed),
+            "skipped": len(skipped),
+            "frames": frames,
+            "without_frames": blank,
+        },
+        skipped=tuple(skipped),
+        instruction_set=instruction_set(),
+    )
+    job.write_receipt(receipt)
+    return receipt
+
+
+def image_features(image: PosedImage, config: FeatureConfig) -> tuple[DecodedImage, Features]:
+    """Decode one image as the survey says it is stored, and describe it."""
+    decoded = decode_image(
+        image.path,
+        quarter_turns=image.quarter_turns if config.make_upright else 0,
+        max_side_px=config.max_side_px,
+        max_pixels=config.max_pixels,
+    )
+    usable: NDArray[np.bool_] | None = None
+    if image.mask_path is not None and config.use_masks:
+        height, width = decoded.rgb.shape[:2]
+        usable = decode_mask(
+            image.mask_path,
+            quarter_turns=image.quarter_turns if config.make_upright else 0,
+            width=width,
+            height=height,
+        )
+    return decoded, extract(decoded.rgb, usable, config)
+
+
+def _columns(found: list[Features], config: FeatureConfig) -> dict[str, NDArray[np.generic]]:
+    """Lay a shard's features end to end: `<detector>/counts` per image, `<channel>` descriptors."""
+    arrays: dict[str, NDArray[np.generic]] = {}
+    for detector in config.detectors:
+        arrays[f"{detector}/counts"] = np.array(
+            [len(features.frames[detector]) for features in found], dtype=np.int32
+        )
+        for descriptor in config.descriptors:
+            channel = f"{detector}-{descriptor}"
+            empty = np.zeros((0, DESCRIPTOR_SIZES[descriptor]), dtype=np.uint8)
+            arrays[channel] = np.concatenate(
+                [empty, *(features.descriptors[channel] for features in found)]
+            )
+    return arrays
+
+
+def read_channel(path: Path, channel: str) -> list[NDArray[np.uint8]]:
+    """One channel of a feature file: descriptors (n, d) uint8 of each image of the shard."""
+    detector = channel.split("-")[0]
+    with np.load(path, allow_pickle=False) as stored:
+        counts, descriptors = stored[f"{detector}/counts"], stored[channel]
+    return np.split(descriptors, np.cumsum(counts)[:-1]) if len(counts) else []
