@@ -23,7 +23,7 @@ from redis import Redis, RedisError
 
 from contracts.errors import BrokerUnreachable, TaskFailed
 from coordinator.follow import Follower
-from workers.app import QUEUES, connect
+from workers.app import QUEUES, make_app
 from workers.run import worker_environment
 
 BROKER_VARIABLE = "FLANEUR_BROKER_URL"
@@ -54,14 +54,14 @@ def running_engine(
     with ExitStack() as stack:
         if broker is not None:
             check_broker(broker)
-            app = connect(broker)
+            app = make_app(broker)
             count = _listening_processes(app, broker)
             workers = None
         else:
             folder = Path(tempfile.mkdtemp(prefix="flaneur-"))
             stack.callback(shutil.rmtree, folder, ignore_errors=True)
             url = stack.enter_context(_embedded_server(folder))
-            app = connect(url)
+            app = make_app(url)
             count = n_workers or available_cores()
             workers = stack.enter_context(LocalWorkers(url, queues, count, folder / "worker.log"))
         follower = Follower(
@@ -156,8 +156,7 @@ class LocalWorkers:
         self._process.terminate()
         with suppress(subprocess.TimeoutExpired):  # killed below
             self._process.wait(timeout=5)
-        _kill_group(self._process.pid)
-        self._process.wait()
+        _end(self._process)
 
     def watch(self) -> None:
         """Start the workers again if they died.
@@ -174,6 +173,7 @@ class LocalWorkers:
                 f"The workers died {RESTARTS + 1} times. The end of their log:\n{tail}"
             )
         self._restarts += 1
+        _end(self._process)
         time.sleep(1.0)
         self._process = self._start()
 
@@ -189,9 +189,13 @@ class LocalWorkers:
             )
 
 
-def _kill_group(group: int) -> None:
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Kill what is left of a worker and its pool."""
     with suppress(ProcessLookupError):  # all of them have ended
-        os.killpg(group, signal.SIGKILL)
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    if process.stdin is not None:
+        process.stdin.close()
 
 
 def _nothing() -> None:

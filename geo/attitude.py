@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geo.headings import wrapped_360
+
 _ENU_FROM_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 _FRD_FROM_RDF = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _GIMBAL_LOCK_SINE = 1e-9
@@ -35,18 +37,9 @@ class Attitude:
     roll_deg: float
 
 
-def normalise_heading(heading_deg: float) -> float:
-    """The same direction within [0, 360)."""
-    turned = math.fmod(heading_deg, 360.0)
-    if turned < 0.0:
-        turned += 360.0
-    # A tiny negative heading rounds to 360 exactly.
-    return 0.0 if turned >= 360.0 else turned
-
-
-def normalise_roll(roll_deg: float) -> float:
-    """The same roll within (-180, 180]."""
-    turned = normalise_heading(roll_deg)
+def wrapped_180(angle_deg: float) -> float:
+    """The same roll within (-180, 180] degrees."""
+    turned = wrapped_360(angle_deg)
     return turned - 360.0 if turned > 180.0 else turned
 
 
@@ -66,12 +59,13 @@ def enu_from_frd(attitude: Attitude) -> NDArray[np.float64]:
     about_down = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
     about_right = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
     about_forward = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
-    return _ENU_FROM_NED @ about_down @ about_right @ about_forward
+    rotation = _ENU_FROM_NED @ about_down @ about_right @ about_forward
+    return np.asarray(rotation, np.float64)
 
 
 def enu_from_rdf(attitude: Attitude) -> NDArray[np.float64]:
     """(3, 3) float64 rotation of a camera with this attitude; columns right, down, optical axis."""
-    return enu_from_frd(attitude) @ _FRD_FROM_RDF
+    return np.asarray(enu_from_frd(attitude) @ _FRD_FROM_RDF, np.float64)
 
 
 def camera_attitude(enu_from_camera: NDArray[np.float64]) -> Attitude:
@@ -101,9 +95,9 @@ def camera_attitude(enu_from_camera: NDArray[np.float64]) -> Attitude:
         heading = math.atan2(axis[0], axis[1])
         roll = math.atan2(-right[2], -down[2])
     return Attitude(
-        normalise_heading(math.degrees(heading)),
+        wrapped_360(math.degrees(heading)),
         math.degrees(pitch),
-        normalise_roll(math.degrees(roll)),
+        wrapped_180(math.degrees(roll)),
     )
 
 

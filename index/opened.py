@@ -16,7 +16,7 @@ from index.files import map_array
 from index.manifest import Generation, live_generation
 from index.segments import map_postings, segment_paths
 from retrieval.codebooks import WordSearcher
-from retrieval.postings import document_frequency
+from retrieval.postings import document_frequency, inverse_document_frequency
 
 
 class OpenedIndex:
@@ -73,7 +73,7 @@ class OpenedIndex:
         """ln(N / df) of each word, 0 for a word in no image; (V,)."""
         if channel not in self._idf:
             frequency = document_frequency(self.postings(channel))
-            self._idf[channel] = np.log(self.n_images / np.maximum(frequency, 1)) * (frequency > 0)
+            self._idf[channel] = inverse_document_frequency(frequency, self.n_images)
         return self._idf[channel]
 
     def distinct_words(self, channels: Sequence[str]) -> NDArray[np.int64]:

@@ -24,7 +24,7 @@ from PIL import ExifTags, Image, UnidentifiedImageError
 from contracts.errors import UnusableImage
 
 # Only raster formats: Pillow's others start programs (EPS), hold no photograph, or are obscure.
-_FORMATS = ("JPEG", "MPO", "PNG", "TIFF", "WEBP", "BMP", "JPEG2000", "PPM")
+_FORMATS = ("JPEG", "PNG", "TIFF", "WEBP", "BMP", "JPEG2000", "PPM")
 # What Pillow's plugins raise on damaged files; only the first is documented.
 _DAMAGED = (
     OSError,
@@ -139,9 +139,7 @@ def decode_mask(
     data = _read_file(path, _MASK_MAX_PIXELS)
     with _open(io.BytesIO(data)) as image:
         mirrored, turns = _exif_turns(image)
-        grey = _upright(
-            _pixels(image, image.size, "L"), mirrored, (turns + quarter_turns) % 4
-        )
+        grey = _upright(_pixels(image, image.size, "L"), mirrored, (turns + quarter_turns) % 4)
     return np.asarray(_resized(grey, (width, height)) < _MASKED_ABOVE)
 
 

@@ -94,7 +94,7 @@ def _pose(gps: _Tags, north: North | None) -> Pose | str:
         northing=lat,
         crs=CRS,
         altitude_m=_altitude_m(gps),
-        heading_deg=_number(gps.get(ExifTags.GPS.GPSImgDirection)),
+        heading_deg=_known(gps.get(ExifTags.GPS.GPSImgDirection)),
         north=north or stated,
     )
     return pose_problem(pose, geographic=True) or normalised(pose)
@@ -108,24 +108,24 @@ def _coordinate(gps: _Tags, value_tag: int, side_tag: int, sides: str) -> float 
     parts = [_number(part) for part in value[:3]]
     if any(part is None for part in parts):
         return math.nan
-    degrees = sum(part / 60**at for at, part in enumerate(parts) if part is not None)
+    degrees = sum(part / 60.0**at for at, part in enumerate(parts) if part is not None)
     return degrees if side == sides[0] else -degrees
 
 
 def _altitude_m(gps: _Tags) -> float | None:
-    altitude = _number(gps.get(ExifTags.GPS.GPSAltitude))
+    altitude = _known(gps.get(ExifTags.GPS.GPSAltitude))
     below = gps.get(ExifTags.GPS.GPSAltitudeRef) in (1, b"\x01")
     return -altitude if altitude is not None and below else altitude
 
 
 def _hfov_deg(header: ImageHeader) -> float | None:
     """From the 35 mm equivalent focal length, which CIPA DCG-001 defines by the diagonal."""
-    focal_mm = _number(header.details.get(ExifTags.Base.FocalLengthIn35mmFilm))
+    focal_mm = _known(header.details.get(ExifTags.Base.FocalLengthIn35mmFilm))
     if focal_mm is None or not focal_mm > 0.0:
         return None
     diagonal_px = math.hypot(header.width_px, header.height_px)
     half_width_mm = _FILM_DIAGONAL_MM / 2 * header.width_px / diagonal_px
-    return math.degrees(2 * math.atan(half_width_mm / focal_mm))
+    return 2.0 * math.degrees(math.atan(half_width_mm / focal_mm))
 
 
 def _captured_at(header: ImageHeader) -> str | None:
@@ -138,10 +138,11 @@ def _captured_at(header: ImageHeader) -> str | None:
         return moment
     day = _text(header.gps.get(ExifTags.GPS.GPSDateStamp)).replace(":", "-")
     stamp = header.gps.get(ExifTags.GPS.GPSTimeStamp)
-    parts = [_number(part) for part in stamp] if isinstance(stamp, tuple) else []
-    if len(parts) != 3 or any(part is None for part in parts):
+    parts = [_known(part) for part in stamp] if isinstance(stamp, tuple) else []
+    known = [int(part) for part in parts if part is not None]
+    if len(known) != 3:
         return None
-    hour, minute, second = (int(part or 0.0) for part in parts)
+    hour, minute, second = known
     return zoned_time(f"{day}T{hour:02d}:{minute:02d}:{second:02d}Z")
 
 
@@ -150,6 +151,12 @@ def _number(value: object) -> float | None:
     if not isinstance(value, int | float | Rational):
         return None
     return float(value)
+
+
+def _known(value: object) -> float | None:
+    """A finite number or None: cameras write 0/0 for what they do not know."""
+    number = _number(value)
+    return number if number is not None and math.isfinite(number) else None
 
 
 def _text(value: object) -> str:

@@ -2,6 +2,7 @@
 
 import fnmatch
 import re
+import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,8 +97,12 @@ def selector(options: ReadOptions) -> Callable[[str], bool]:
 
 
 def _compiled(pattern: str) -> Callable[[str], bool]:
-    pieces = [fnmatch.translate(piece) for piece in pattern.split("**/")]
-    bodies = [piece.removeprefix("(?s:").removesuffix(")\\Z").removesuffix(")\\z") for piece in pieces]
+    pieces = [
+        fnmatch.translate(piece) for piece in unicodedata.normalize("NFC", pattern).split("**/")
+    ]
+    bodies = [
+        piece.removeprefix("(?s:").removesuffix(")\\Z").removesuffix(")\\z") for piece in pieces
+    ]
     expression = re.compile("(?:.*/)?".join(bodies), re.DOTALL)
     by_name = "/" not in pattern
 

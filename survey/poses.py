@@ -9,8 +9,9 @@ import pyproj
 from numpy.typing import NDArray
 
 from contracts.records import Pose
-from geo.attitude import normalise_heading, normalise_roll
+from geo.attitude import wrapped_180
 from geo.crs import parse_crs
+from geo.headings import wrapped_360
 
 _LOWEST_M, _HIGHEST_M = -1_000.0, 10_000.0
 _AREA_MARGIN_DEG = 2.0
@@ -71,8 +72,8 @@ def normalised(pose: Pose) -> Pose:
     """The same pose with its heading within [0, 360) and its roll within (-180, 180]."""
     return replace(
         pose,
-        heading_deg=None if pose.heading_deg is None else normalise_heading(pose.heading_deg),
-        roll_deg=None if pose.roll_deg is None else normalise_roll(pose.roll_deg),
+        heading_deg=None if pose.heading_deg is None else wrapped_360(pose.heading_deg),
+        roll_deg=None if pose.roll_deg is None else wrapped_180(pose.roll_deg),
     )
 
 

@@ -27,11 +27,14 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
         `options.format` names no reader.
     """
     path = Path(path)
-    if not path.exists():
-        raise BadSurvey(f"survey {path} does not exist; check the path")
     if options.crs is not None:
         crs_name(options.crs)
-    reader = choose_reader(path, options)
+    try:
+        if not path.exists():
+            raise BadSurvey(f"survey {path} does not exist; check the path")
+        reader = choose_reader(path, options)
+    except OSError as error:
+        raise BadSurvey(f"survey {path} cannot be looked into: {error.strerror}") from error
     wanted = selector(options)
     reading = reader.read(path, options, wanted)
     if options.no_pose:

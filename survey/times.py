@@ -12,4 +12,9 @@ def zoned_time(text: str) -> str | None:
         moment = datetime.fromisoformat(text.strip())
     except ValueError:
         return None
-    return None if moment.tzinfo is None else moment.isoformat().replace("+00:00", "Z")
+    if moment.tzinfo is None:
+        return None
+    precision = "auto" if moment.microsecond % 1000 else "milliseconds"
+    if not moment.microsecond:
+        precision = "seconds"
+    return moment.isoformat(timespec=precision).replace("+00:00", "Z")

@@ -38,12 +38,12 @@ def run_worker(
 
     from retrieval.features import compile_kernels
     from workers import tasks  # noqa: F401 - registers the tasks before processes are forked
-    from workers.app import connect
+    from workers.app import app
 
     cv2.setNumThreads(1)
     faiss.omp_set_num_threads(1)
     compile_kernels()
-    app = connect(broker_url)
+    app.conf.update(broker_url=broker_url, result_backend=broker_url)
     if with_parent:
         threading.Thread(target=_stop_with_parent, args=(broker_url,), daemon=True).start()
     app.worker_main(

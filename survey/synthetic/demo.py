@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from survey.synthetic.canvas import Rgb
-from survey.synthetic.render import Town, build_town, render
+from survey.synthetic.render import render
 from survey.synthetic.shots import (
     QueryShot,
     ShotOptions,
@@ -22,6 +22,7 @@ from survey.synthetic.shots import (
 )
 from survey.synthetic.street import StreetPlan
 from survey.synthetic.styles import postcard, restyle
+from survey.synthetic.town import Town, build_town
 
 RELEVANT_WITHIN_M = 40.0
 _JPEG = [int(cv2.IMWRITE_JPEG_QUALITY), 90]

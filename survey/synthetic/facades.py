@@ -6,11 +6,23 @@ import cv2
 import numpy as np
 
 from survey.synthetic import materials
-from survey.synthetic.canvas import PX_PER_M, Canvas, Colour, Rgb, px, shaded
+from survey.synthetic.canvas import PX_PER_M, Canvas, Rgb, px, shaded
+from survey.synthetic.details import (
+    IRON,
+    draw_bars,
+    draw_board,
+    draw_extras,
+    draw_frieze,
+    draw_ivy,
+)
 from survey.synthetic.openings import GRANITE, draw_door, draw_shop, draw_window
 from survey.synthetic.templates import Template
 
-IRON: Colour = (38, 40, 42)
+# How often a copy has what its sisters have not; more of it makes houses easier to tell apart.
+FRIEZE_SHARE = 0.7
+BOARD_SHARE = 0.6
+IVY_SHARE = 0.3
+BLIND_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +51,7 @@ def paint_facade(make: Template, width_m: float, seed: int) -> FacadeSkin:
     """Paint one copy of a template.
 
     The layout comes from the template alone; the seed decides tint, stains, curtains, shutters,
-    blind windows, the door's place, sign, awning, plaque, pipe and plants.
+    blind windows, the door's place, ironwork, frieze, boards, signs, awnings, pipe and plants.
     """
     rng = np.random.default_rng(seed)
     tint = rng.uniform(0.93, 1.07) * rng.uniform(0.985, 1.015, 3)
@@ -48,21 +60,28 @@ def paint_facade(make: Template, width_m: float, seed: int) -> FacadeSkin:
     bay = (width_m - 0.8) / make.bays
     centres = [0.4 + bay * (index + 0.5) for index in range(make.bays)]
     _draw_mouldings(canvas, make, lights)
-    blind = (int(rng.integers(make.floors)), int(rng.integers(make.bays)))
+    if rng.random() < FRIEZE_SHARE:
+        draw_frieze(canvas, make, lights[int(rng.integers(make.floors))], rng)
+    blind = rng.random((make.floors, make.bays)) < BLIND_SHARE
+    ironwork = int(rng.integers(4))
     for floor, level in enumerate(lights):
         sill = level + min(0.75, make.floor_m - make.window.height_m - 0.45)
         for index, centre in enumerate(centres):
-            if (floor, index) == blind and make.window.width_m < 2:
+            if blind[floor, index] and make.window.width_m < 2:
                 _draw_blind(canvas, centre, sill, make)
             else:
                 draw_window(canvas, centre, sill, make, rng)
     awning = _draw_ground(canvas, make, centres, rng)
     _draw_roof(canvas, make, centres, rng)
-    _draw_extras(canvas, make, rng)
+    if rng.random() < BOARD_SHARE:
+        draw_board(canvas, make, lights[int(rng.integers(min(2, make.floors)))], rng)
+    if rng.random() < IVY_SHARE:
+        draw_ivy(canvas, make, rng)
+    draw_extras(canvas, make, rng)
     _weather(canvas, tint, rng)
-    reliefs = [_balcony(make, width_m, lights[floor - 1]) for floor in make.balconies]
+    reliefs = [_balcony(make, width_m, lights[floor - 1], ironwork) for floor in make.balconies]
     for floor in make.railed:
-        reliefs += [_railing(make, centre, lights[floor - 1], rng) for centre in centres]
+        reliefs += [_railing(make, centre, lights[floor - 1], ironwork, rng) for centre in centres]
     return FacadeSkin(canvas.pixels, tuple(reliefs + awning))
 
 
@@ -210,22 +229,6 @@ def _draw_roof(
         canvas.rect(x, base - 0.2, x + 0.2, base, shaded(make.trim, 0.82))
 
 
-def _draw_extras(canvas: Canvas, make: Template, rng: np.random.Generator) -> None:
-    """A rain pipe, a plaque or a poster, a house number: each copy has its own."""
-    side = 0.25 if rng.random() < 0.5 else canvas.width_m - 0.3
-    canvas.line((side, 0), (side, make.height_m - make.roof_m), 0.11, (92, 96, 94))
-    canvas.line((side - 0.03, 0), (side - 0.03, make.height_m - make.roof_m), 0.03, (150, 154, 150))
-    place, low = rng.uniform(1, canvas.width_m - 2), make.ground_m + rng.uniform(0.1, 0.4)
-    if rng.random() < 0.6:
-        canvas.raised(place, low, place + 0.9, low + 0.5, (26, 52, 118))
-        number = str(int(rng.integers(1, 99)))
-        canvas.text(number, (place + 0.1, low + 0.1, place + 0.8, low + 0.4), (240, 240, 240))
-    if rng.random() < 0.5:
-        lines = np.sort(rng.uniform(0, canvas.width_m, 2))
-        high = make.ground_m - 0.15
-        canvas.line((float(lines[0]), high), (float(lines[1]), high - 0.1), 0.03, IRON)
-
-
 def _weather(canvas: Canvas, tint: np.ndarray, rng: np.random.Generator) -> None:
     shape = canvas.pixels.shape[:2]
     tone = materials.stains(shape, 10, rng) + materials.noise(shape, 60, rng) * 0.03
@@ -237,21 +240,17 @@ def _weather(canvas: Canvas, tint: np.ndarray, rng: np.random.Generator) -> None
         canvas.pixels[..., channel] = cv2.multiply(plane, gain, dtype=cv2.CV_8U)
 
 
-def _bars(width_m: float, height_m: float, step_m: float) -> Canvas:
+def _bars(width_m: float, height_m: float, pattern: int) -> Canvas:
     canvas = Canvas(np.zeros((px(height_m), px(width_m), 4), dtype=np.uint8))
     canvas.pixels[..., :3] = IRON
-    for x in np.arange(step_m / 2, width_m, step_m):
-        canvas.line((x, 0), (x, height_m), 0.025, IRON)
-        canvas.disc(x, height_m * 0.5, (0.05, 0.1), IRON)
-    canvas.rect(0, height_m - 0.07, width_m, height_m, IRON)
-    canvas.rect(0, 0.1, width_m, 0.14, IRON)
+    draw_bars(canvas, pattern)
     return canvas
 
 
-def _balcony(make: Template, width_m: float, level_m: float) -> Relief:
+def _balcony(make: Template, width_m: float, level_m: float, ironwork: int) -> Relief:
     """A balcony along the whole front: slab, consoles below, railing."""
     canvas = Canvas(np.zeros((px(1.45), px(width_m - 0.6), 4), dtype=np.uint8))
-    rail = _bars(width_m - 0.6, 0.95, 0.13)
+    rail = _bars(width_m - 0.6, 0.95, ironwork)
     canvas.pixels[: rail.pixels.shape[0]] = rail.pixels
     canvas.rect(0, 0.3, canvas.width_m, 0.52, make.trim)
     canvas.rect(0, 0.3, canvas.width_m, 0.36, shaded(make.trim, 0.6))
@@ -260,10 +259,12 @@ def _balcony(make: Template, width_m: float, level_m: float) -> Relief:
     return Relief(0.3, level_m - 0.42, 0.6, canvas.pixels)
 
 
-def _railing(make: Template, centre: float, level_m: float, rng: np.random.Generator) -> Relief:
+def _railing(
+    make: Template, centre: float, level_m: float, ironwork: int, rng: np.random.Generator
+) -> Relief:
     """A guard rail of one window, sometimes with flowers."""
     width = make.window.width_m + 0.2
-    canvas = _bars(width, 0.85, 0.12)
+    canvas = _bars(width, 0.85, ironwork)
     if rng.random() < 0.2:
         for _ in range(60):
             x, y = rng.uniform(0.05, width - 0.05), rng.uniform(0.1, 0.5)

@@ -1,102 +1,22 @@
 """Draw the town as a camera sees it: far to near, each panel by its homography."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from survey.synthetic import sprites
-from survey.synthetic.camera import NEAR_M, Floats, Lens, Panel, View, fill_mask
-from survey.synthetic.canvas import PX_PER_M, Rgb
-from survey.synthetic.facades import paint_facade
-from survey.synthetic.sprites import ROAD_SECTION_M, SIZES_M
-from survey.synthetic.street import UP, Facade, Furniture, Sort, StreetPlan, furnish, lay_out
+from survey.synthetic.camera import Floats, Lens, Panel, View, fill_mask
+from survey.synthetic.canvas import Rgb
+from survey.synthetic.town import Decal, Town
+from survey.synthetic.visibility import by_distance, facing, standing
 
 SUPERSAMPLE = 1.5
 """Pictures are drawn this much larger and reduced: it smooths all edges."""
 _STRIP_M = 4.0
 """Panels are drawn in strips of this width, each from the texture level that fits its distance."""
-_SUN = np.array([0.55, -0.8, 0.0])
 _HAZE = (186, 190, 194)
 _ASPHALT = (108, 108, 110)
-
-
-@dataclass(frozen=True, slots=True)
-class Decal:
-    """A panel and its texture levels, RGB, or RGBA premultiplied."""
-
-    panel: Panel
-    levels: tuple[Rgb, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class House:
-    """A facade ready to be drawn: wall and what hangs on it."""
-
-    facade: Facade
-    wall: Decal
-    reliefs: tuple[Decal, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Town:
-    """All that can be seen."""
-
-    plan: StreetPlan
-    houses: tuple[House, ...]
-    road: tuple[Decal, ...]
-    furniture: tuple[Furniture, ...]
-    sprites: dict[tuple[Sort, int], tuple[Rgb, ...]]
-    skies: tuple[Rgb, ...]
-
-
-def build_town(plan: StreetPlan, seed: int) -> Town:
-    """Lay out the streets and paint every texture; the same seed gives the same town."""
-    rng = np.random.default_rng([seed, 3])
-    houses = tuple(_build_house(facade) for facade in lay_out(plan, seed))
-    tile = sprites.shrink(sprites.paint_road(plan.width_m, rng))
-    road = tuple(Decal(panel, tile) for panel in _road_panels(plan))
-    sorts: tuple[Sort, ...] = ("tree", "lamp", "car")
-    looks = {
-        (sort, variant): sprites.shrink(
-            sprites.premultiplied(sprites.paint_sprite(sort, variant, rng))
-        )
-        for sort in sorts
-        for variant in range(4)
-    }
-    skies = tuple(sprites.paint_sky(rng, cover) for cover in (0.35, 0.75))
-    return Town(plan, houses, road, furnish(plan, seed), looks, skies)
-
-
-def _build_house(facade: Facade) -> House:
-    panel = facade.panel
-    skin = paint_facade(facade.template, panel.width_m, facade.seed)
-    light = 0.94 + 0.14 * float(facade.outward @ _SUN)
-    wall = cv2.convertScaleAbs(skin.wall, alpha=light)
-    reliefs = []
-    for relief in skin.reliefs:
-        height, width = (side / PX_PER_M for side in relief.rgba.shape[:2])
-        corner = panel.point(relief.left_m, relief.bottom_m) + relief.depth_m * facade.outward
-        place = Panel(corner, panel.along, UP, width, height)
-        reliefs.append(Decal(place, sprites.shrink(sprites.premultiplied(relief.rgba))))
-    levels = sprites.shrink(np.asarray(wall, dtype=np.uint8))
-    return House(facade, Decal(panel, levels), tuple(reliefs))
-
-
-def _road_panels(plan: StreetPlan) -> list[Panel]:
-    panels = []
-    for start, end in plan.edges(plan.width_m / 2):
-        length = float(np.linalg.norm(end - start))
-        ahead = np.array([*((end - start) / length), 0.0])
-        left = np.array([-ahead[1], ahead[0], 0.0])
-        count = int(np.ceil(length / ROAD_SECTION_M))
-        step = length / count
-        for index in range(count):
-            origin = np.array([*start, plan.ground_m]) + index * step * ahead
-            panels.append(Panel(origin, ahead, left, step, plan.width_m))
-    return panels
 
 
 def render(town: Town, view: View, *, sky: int = 0, cars: bool = True) -> Rgb:
@@ -106,98 +26,16 @@ def render(town: Town, view: View, *, sky: int = 0, cars: bool = True) -> Rgb:
     """
     lens = Lens.of(view, SUPERSAMPLE)
     picture = _draw_sky(town.skies[sky], lens, view)
-    for section in _by_distance(town.road, lens):
+    for section in by_distance(town.road, lens):
         _draw(picture, lens, section)
     for house in facing(town, view):
         _draw(picture, lens, house.wall)
         for relief in house.reliefs:
             _draw(picture, lens, relief)
-    for thing in _standing(town, lens, cars):
+    for thing in standing(town, lens, cars):
         _draw(picture, lens, thing)
     size = (view.width_px, view.height_px)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-
-
-def facing(town: Town, view: View) -> list[House]:
-    """The houses that turn their front to the camera, in the order of drawing.
-
-    The loop's inner block is convex and lies between the camera and all other houses that it
-    covers, so the outer houses come first; within a ring, fronts hide nothing of each other.
-    """
-    turned = [
-        h for h in town.houses if (view.centre - h.facade.panel.origin) @ h.facade.outward > 0
-    ]
-    return sorted(
-        turned,
-        key=lambda h: (h.facade.inner, -float(np.linalg.norm(h.facade.middle - view.centre))),
-    )
-
-
-def shares_seen(town: Town, view: View) -> dict[str, tuple[float, float]]:
-    """For every facade in the picture: the share of the picture it fills, and its offset.
-
-    The offset is the distance of its visible part's centre from the picture's, in picture widths.
-    """
-    lens = Lens.of(view, 0.25)
-    labels = np.zeros((lens.height_px, lens.width_px), dtype=np.int32)
-    order = facing(town, view)
-    for label, house in enumerate(order, start=1):
-        panel = house.facade.panel
-        homography = lens.from_panel(panel)
-        outline = lens.outline(homography, (0, 0, panel.width_m, panel.height_m))
-        if len(outline):
-            labels[fill_mask(outline, labels.shape) > 0] = label
-    seen = {}
-    middle = np.array([lens.width_px - 1, lens.height_px - 1]) / 2
-    for label in np.unique(labels[labels > 0]):
-        rows, cols = np.nonzero(labels == label)
-        offset = np.hypot(cols.mean() - middle[0], rows.mean() - middle[1]) / lens.width_px
-        seen[order[label - 1].facade.name] = (len(rows) / labels.size, float(offset))
-    return seen
-
-
-def _by_distance(decals: tuple[Decal, ...], lens: Lens) -> list[Decal]:
-    def distance(decal: Decal) -> float:
-        middle = decal.panel.point(decal.panel.width_m / 2, decal.panel.height_m / 2)
-        return float(np.linalg.norm(middle - lens.centre))
-
-    return sorted(decals, key=distance, reverse=True)
-
-
-def _standing(town: Town, lens: Lens, cars: bool) -> list[Decal]:
-    """Furniture as panels, far to near, without what the inner block hides."""
-    decals = []
-    block = town.plan.edges(-town.plan.width_m / 2)
-    for thing in town.furniture:
-        depth = float(lens.matrix[2] @ (thing.foot - lens.centre))
-        if (thing.sort == "car" and not cars) or depth < NEAR_M:
-            continue
-        if _hidden(block, lens.centre, thing.foot):
-            continue
-        width, height = SIZES_M[thing.sort]
-        along = thing.along
-        if thing.sort != "car":
-            towards = thing.foot - lens.centre
-            along = np.array([towards[1], -towards[0], 0.0])
-            along /= max(float(np.linalg.norm(along)), 1e-9)
-        panel = Panel(thing.foot - along * width / 2, along, UP, width, height)
-        decals.append(Decal(panel, town.sprites[thing.sort, thing.variant]))
-    return _by_distance(tuple(decals), lens)
-
-
-def _hidden(block: list[tuple[Floats, Floats]], eye: Floats, foot: Floats) -> bool:
-    """Whether a convex block, given by its sides, stands on the line from eye to foot."""
-    enters, leaves = 0.0, 1.0
-    for start, end in block:
-        outwards = np.array([end[1] - start[1], start[0] - end[0]])
-        before, after = float(outwards @ (eye[:2] - start)), float(outwards @ (foot[:2] - start))
-        if before > 0 and after > 0:
-            return False
-        if before > 0:
-            enters = max(enters, before / (before - after))
-        elif after > 0:
-            leaves = min(leaves, before / (before - after))
-    return enters < leaves
 
 
 def _draw(picture: Rgb, lens: Lens, decal: Decal) -> None:

@@ -5,12 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.synthetic.camera import View
-from survey.synthetic.render import Town, shares_seen
 from survey.synthetic.street import Facade, StreetPlan
 from survey.synthetic.styles import STYLES
+from survey.synthetic.town import Town
+from survey.synthetic.visibility import share_covered, shares_seen
 
-SEEN_SHARE = 0.12
+SEEN_SHARE = 0.10
 """A facade counts as seen where it fills at least this share of a picture."""
+
+MOST_COVERED = 0.15
+"""No query is taken where a tree or lamp fills more of the picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,9 +141,10 @@ def _take_aim(
 
 
 def _shows(town: Town, view: View, facade: Facade) -> bool:
-    """Whether the facade is what the picture is mainly of."""
+    """Whether the facade is what the picture is mainly of, and no tree stands in the way."""
     seen = shares_seen(town, view)
-    return facade.name in seen and max(seen, key=lambda name: seen[name][0]) == facade.name
+    largest = max(seen, key=lambda name: seen[name][0])
+    return largest == facade.name and share_covered(town, view) < MOST_COVERED
 
 
 def facades_seen(town: Town, view: View) -> tuple[str, ...]:

@@ -11,15 +11,17 @@ from survey.synthetic.canvas import Rgb
 from survey.synthetic.materials import noise
 
 # How hard each style is; larger is harder.
-SEPIA_BLUR_PX = 1.3
-SEPIA_CONTRAST = 0.52
-SEPIA_GRAIN = 9.0
-HALFTONE_CELL_PX = 5.0
-HALFTONE_DEPTH = 0.9
-ENGRAVING_PITCH_PX = 4.6
-ENGRAVING_DEPTH = 0.85
-NIGHT_LIGHT = 0.17
-NIGHT_NOISE = 9.0
+SEPIA_BLUR_PX = 0.9
+SEPIA_CONTRAST = 0.65
+SEPIA_GRAIN = 6.0
+HALFTONE_CELL_PX = 4.0
+HALFTONE_DEPTH = 0.4
+HALFTONE_SCAN_BLUR_PX = 1.0
+ENGRAVING_PITCH_PX = 4.0
+ENGRAVING_DEPTH = 0.4
+ENGRAVING_SCAN_BLUR_PX = 0.9
+NIGHT_LIGHT = 0.4
+NIGHT_NOISE = 4.5
 NIGHT_LIT_SHARE = 0.3
 
 Plane = NDArray[np.float32]
@@ -59,6 +61,11 @@ def _inked(ink: Plane, paper: tuple[int, int, int], colour: tuple[int, int, int]
     return np.asarray(np.rint(mixed), dtype=np.uint8)
 
 
+def _scanned(rgb: Rgb, blur_px: float) -> Rgb:
+    """What a scanner's optics make of a print's dots and lines."""
+    return np.asarray(cv2.GaussianBlur(rgb, (0, 0), blur_px), dtype=np.uint8)
+
+
 def _vignette(shape: tuple[int, int], depth: float) -> Plane:
     rows = np.linspace(-1, 1, shape[0], dtype=np.float32)[:, None]
     cols = np.linspace(-1, 1, shape[1], dtype=np.float32)[None]
@@ -70,7 +77,7 @@ def _sepia(rgb: Rgb, rng: np.random.Generator) -> Rgb:
     # Old plates see blue as bright and red as dark.
     plate = rgb.astype(np.float32) @ np.array([0.12, 0.38, 0.5], np.float32) / 255
     blurred = cv2.GaussianBlur(plate, (0, 0), SEPIA_BLUR_PX)
-    tone = 0.5 + (blurred - 0.5) * SEPIA_CONTRAST + 0.08
+    tone = 0.5 + (blurred - 0.5) * SEPIA_CONTRAST + 0.16
     tone = tone + noise(shape, 90, rng) * 0.03 + noise(shape, 250, rng) * 0.04
     tone = tone * _vignette(shape, 0.35)
     tone = tone + noise(shape, 1.4, rng) * np.float32(SEPIA_GRAIN / 255)
@@ -107,7 +114,8 @@ def _halftone(rgb: Rgb, rng: np.random.Generator) -> Rgb:
     paper = (240, 232, 214)
     if rng.random() < 0.5:
         ink = (26, 24, 34) if rng.random() < 0.5 else (64, 36, 26)
-        return _inked(_dots(1 - _grey(rgb), HALFTONE_CELL_PX, 45.0), paper, ink)
+        single = _inked(_dots(1 - _grey(rgb), HALFTONE_CELL_PX, 45.0), paper, ink)
+        return _scanned(single, HALFTONE_SCAN_BLUR_PX)
     share = 1 - rgb.astype(np.float32) / 255
     black = np.asarray(share.min(axis=2) * 0.8, dtype=np.float32)
     printed = np.full(rgb.shape, paper, dtype=np.float32)
@@ -117,7 +125,7 @@ def _halftone(rgb: Rgb, rng: np.random.Generator) -> Rgb:
         dots = _dots(plane, HALFTONE_CELL_PX, angle)[..., None]
         printed *= 1 - dots * (1 - np.array(colour, np.float32) / 255)
     printed *= 1 - 0.85 * _dots(black, HALFTONE_CELL_PX, 45.0)[..., None]
-    return np.asarray(printed, dtype=np.uint8)
+    return _scanned(np.asarray(printed, dtype=np.uint8), HALFTONE_SCAN_BLUR_PX)
 
 
 def _engraving(rgb: Rgb, rng: np.random.Generator) -> Rgb:
@@ -136,7 +144,8 @@ def _engraving(rgb: Rgb, rng: np.random.Generator) -> Rgb:
         thickness = np.clip((1 - grey - begins) / 0.6, 0, 0.75)
         lines = np.clip((thickness - ridge) * 4 + 0.5, 0, 1) * (thickness > 0)
         ink = np.maximum(ink, lines * ENGRAVING_DEPTH)
-    return _inked(np.asarray(ink, dtype=np.float32), (242, 236, 220), (28, 24, 22))
+    drawn = _inked(np.asarray(ink, dtype=np.float32), (242, 236, 220), (28, 24, 22))
+    return _scanned(drawn, ENGRAVING_SCAN_BLUR_PX)
 
 
 def _night(rgb: Rgb, rng: np.random.Generator) -> Rgb:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from contracts.config import MAX_NEIGHBOURS, CodebookConfig
 from contracts.errors import VocabularyMismatch, WrongInput
-from retrieval import clustering
+from retrieval import clustering, word_search
 from retrieval.clustering import flat_kmeans, share_out, two_level_kmeans
 from retrieval.codebooks import (
     Codebook,
@@ -223,6 +223,18 @@ def test_ties_reaching_far_beyond_what_was_asked_still_go_to_the_smallest_word()
     words = np.repeat(np.eye(3, dtype=np.uint8) * 9, 200, axis=0)
     word_ids, _ = searcher(words).nearest(np.array([[0, 9, 0]] * 30, np.uint8), 2)
     assert word_ids.tolist() == [[200, 201]] * 30
+
+
+@pytest.mark.parametrize("k", [1, 2, 5])
+def test_ties_are_settled_even_if_the_search_prefers_the_largest_word(k: int) -> None:
+    distances = np.array([[7] * 60 + [9], [9] + [7] * 60, [5, 5] + [8] * 59])
+    keys = distances.astype(np.int64) << 32 | np.arange(61)
+
+    def contrary(rows: NDArray[np.int64], asked: int) -> NDArray[np.int64]:
+        order = np.lexsort((-np.arange(61) * np.ones((len(rows), 1)), distances[rows]))
+        return np.sort(np.take_along_axis(keys[rows], order[:, :asked], axis=1), axis=1)
+
+    assert word_search._settled(contrary, 3, k, 61).tolist() == np.sort(keys)[:, :k].tolist()
 
 
 def test_the_largest_distances_stay_exact() -> None:

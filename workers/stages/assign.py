@@ -34,7 +34,7 @@ def assign_shard(job: JobFolder, shard: int, first_image_id: int) -> Receipt:
         image_ids: list[np.ndarray] = [np.zeros(0, dtype=np.uint32)]
         for offset, descriptors in enumerate(read_channel(job.features(shard), channel)):
             nearest, _ = searcher.nearest(descriptors, 1)
-            words.append(nearest[:, 0])
+            words.append(nearest.ravel())
             image_ids.append(np.full(len(descriptors), first_image_id + offset, dtype=np.uint32))
         postings = build_postings(
             np.concatenate(words), np.concatenate(image_ids), len(searcher.codebook.words)

@@ -1,13 +1,9 @@
 """Train: a deterministic sample of all shards' features becomes a channel's codebook."""
 
-import numpy as np
-
-from contracts.config import DESCRIPTOR_SIZES, MAX_NEIGHBOURS
 from contracts.records import Receipt
 from index.codebooks import codebook_paths, write_codebook
 from index.jobs import JobFolder
 from retrieval.codebooks import (
-    Codebook,
     SampleReservoir,
     n_words_for,
     sample_keys,
@@ -30,10 +26,7 @@ def train_channel(job: JobFolder, channel: str) -> Receipt:
             keys = sample_keys(image.sha256, len(descriptors), config.seed)
             reservoir.offer(keys, descriptors)
             n_points += len(descriptors)
-    if n_points:
-        codebook = train_codebook(reservoir.sample(), n_words_for(n_points, config), config.seed)
-    else:
-        codebook = _no_words(channel)
+    codebook = train_codebook(reservoir.sample(), n_words_for(n_points, config), config.seed)
     paths = codebook_paths(job.root, plan.segment, channel)
     outputs = {
         job.relative(path): digest for path, digest in write_codebook(paths, codebook).items()
@@ -47,10 +40,3 @@ def train_channel(job: JobFolder, channel: str) -> Receipt:
     )
     job.write_receipt(receipt)
     return receipt
-
-
-def _no_words(channel: str) -> Codebook:
-    """One word that nothing will be assigned to: the survey has no frame in this channel."""
-    size = next(d for name, d in DESCRIPTOR_SIZES.items() if channel.endswith(f"-{name}"))
-    words = np.zeros((1, size), dtype=np.uint8)
-    return Codebook(words, 0.0, np.zeros(MAX_NEIGHBOURS, dtype=np.float32))

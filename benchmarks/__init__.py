@@ -1,0 +1,1 @@
+"""Figures on real images, run by hand: `make bench`, or `python -m benchmarks NAME`."""

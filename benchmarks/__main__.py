@@ -1,0 +1,22 @@
+"""`python -m benchmarks [NAME...]`: run them, all by default."""
+
+import os
+import sys
+from pathlib import Path
+
+from benchmarks import kth, stereopolis, workers
+
+BENCHMARKS = {"stereopolis": stereopolis.run, "kth": kth.run, "workers": workers.run}
+
+
+def main() -> None:
+    data = Path(os.environ.get("FLANEUR_TEST_DATA", Path(__file__).parents[2] / "shared" / "data"))
+    if not data.is_dir():
+        sys.exit(f"No real images at {data}; set FLANEUR_TEST_DATA.")
+    for name in sys.argv[1:] or BENCHMARKS:
+        print(f"\n## {name}\n")
+        BENCHMARKS[name](data)
+
+
+if __name__ == "__main__":
+    main()
