@@ -7,14 +7,14 @@ apart, and a plain bag of words finds nearly all of it too.
 import math
 import tempfile
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from benchmarks.table import print_table
-from contracts.config import FeatureConfig, IndexConfig, SearchConfig
+from contracts.config import IndexConfig, SearchConfig
 from contracts.records import PosedImage
 from coordinator.cli.show import bars
 from coordinator.engine import Engine, running_engine
@@ -29,6 +29,16 @@ from survey import ReadOptions, decode_image, read_survey
 FIRST_PASS = ("*_00004??.jpg", "*_00005??.jpg")
 SECOND_PASS = ("*_00007??.jpg",)
 NEAR_M, WITHIN_M, WITHIN_DEG = 10.0, 5.0, 30.0
+
+_READ = ReadOptions(include=FIRST_PASS)
+_SIFT_ALONE = SearchConfig(pair=("hesaff",), k=2, descriptors=("sift",), vote="union")
+ABLATIONS = (
+    ("Flaneur", _READ, SearchConfig(), False),
+    ("hesaff-SIFT alone", _READ, _SIFT_ALONE, False),
+    ("hesaff-SIFT bag of words", _READ, SearchConfig(), True),
+    ("not put upright", replace(_READ, make_upright=False), SearchConfig(), False),
+    ("no mask", replace(_READ, use_masks=False), SearchConfig(), False),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,21 +55,9 @@ def run(data: Path) -> None:
     with tempfile.TemporaryDirectory() as scratch, running_engine(None, None) as engine:
         queries = second_pass(survey, Path(scratch))
         rows = []
-        for name, features, search, plain in (
-            ("Flaneur", FeatureConfig(), SearchConfig(), False),
-            (
-                "hesaff-SIFT alone",
-                FeatureConfig(),
-                SearchConfig(pair=("hesaff",), k=2, descriptors=("sift",), vote="union"),
-                False,
-            ),
-            ("hesaff-SIFT bag of words", FeatureConfig(), SearchConfig(), True),
-            ("not put upright", FeatureConfig(make_upright=False), SearchConfig(), False),
-            ("no mask", FeatureConfig(use_masks=False), SearchConfig(), False),
-        ):
-            config = IndexConfig(features=features)
-            root = Path(scratch) / config.digest()
-            index, rate, size = index_first_pass(survey, root, config, engine)
+        for name, options, search, plain in ABLATIONS:
+            root = Path(scratch) / f"index-{len(rows)}"
+            index, rate, size = index_first_pass(survey, root, options, engine)
             with bars() as progress:
                 progress.begin("locate", len(queries), 0)
                 located = locate_photos(
@@ -102,15 +100,15 @@ def second_pass(survey: Path, scratch: Path) -> list[Query]:
 
 
 def index_first_pass(
-    survey: Path, root: Path, config: IndexConfig, engine: Engine
+    survey: Path, root: Path, options: ReadOptions, engine: Engine
 ) -> tuple[OpenedIndex, str, str]:
-    """Index it (once for a configuration); returns images per second and bytes per image too."""
-    intake = read_surveys([("", survey)], ReadOptions(include=FIRST_PASS))
-    job, plan = make_plan(root, intake, config, DEFAULT_SHARD_SIZE // 4)
+    """Index it; returns images per second and bytes per image too."""
+    intake = read_surveys([("", survey)], options)
+    job, plan = make_plan(root, intake, IndexConfig(), DEFAULT_SHARD_SIZE // 4)
     with bars() as progress:
         report = run_job(job, plan, intake, nullcontext(engine), progress)
     n_images = report.generation.n_images
-    rate = f"{report.images_extracted / report.seconds:.2f}" if report.images_extracted else "-"
+    rate = f"{report.images_extracted / report.seconds:.2f}"
     return OpenedIndex(root), rate, f"{report.bytes_on_disk / n_images:,.0f}"
 
 

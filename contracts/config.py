@@ -51,8 +51,6 @@ class FeatureConfig(_Frozen):
     """Frames kept per detector and image."""
     max_side_px: Annotated[int, Field(ge=16, le=16_384)] = 1024
     max_pixels: Annotated[int, Field(ge=1)] = 250_000_000
-    use_masks: bool = True
-    make_upright: bool = True
 
     @model_validator(mode="after")
     def _no_repeats(self) -> Self:

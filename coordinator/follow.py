@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any, TypeVar
 
 from celery import Celery, states
-from celery.result import AsyncResult
 from redis import Redis, RedisError
 
 from contracts.errors import BrokerUnreachable, TaskFailed
@@ -37,7 +36,7 @@ class Order:
 @dataclass(slots=True)
 class _Flight:
     order: Order
-    result: AsyncResult
+    task_id: str
     sent_at: float = field(default_factory=time.monotonic)
 
 
@@ -77,7 +76,7 @@ class Follower:
                     flying.append(self._patiently(partial(self._send, order)))
             if not flying:
                 return
-            landed = [flight for flight in flying if self._patiently(flight.result.ready)]
+            landed = [flight for flight in flying if self._is_done(flight)]
             for flight in landed:
                 flying.remove(flight)
                 yield self._outcome(flight)
@@ -104,16 +103,21 @@ class Follower:
 
     def _send(self, order: Order) -> _Flight:
         task_id = f"{self._run_id}.{order.name}.{order.key}"
-        result = self._app.send_task(
+        # The result object is let go: it would listen, and we ask (a bounded number of keys).
+        self._app.send_task(
             f"flaneur.{order.name}", args=[order.message], task_id=task_id, retry=False
         )
-        return _Flight(order, result)
+        return _Flight(order, task_id)
+
+    def _is_done(self, flight: _Flight) -> bool:
+        state = self._patiently(partial(self._app.backend.get_state, flight.task_id))
+        return state in states.READY_STATES
 
     def _outcome(self, flight: _Flight) -> Outcome:
-        state = self._patiently(lambda: flight.result.state)
-        value = self._patiently(lambda: flight.result.result)
-        self._patiently(flight.result.forget)
-        if state == states.SUCCESS:
+        meta = self._patiently(partial(self._app.backend.get_task_meta, flight.task_id))
+        self._patiently(partial(self._app.backend.forget, flight.task_id))
+        value = meta["result"]
+        if meta["status"] == states.SUCCESS:
             return Outcome(flight.order, value, None)
         return Outcome(flight.order, None, f"{type(value).__name__}: {value}")
 
@@ -124,11 +128,10 @@ class Follower:
         self._server_run = server_run
         now = time.monotonic()
         for flight in flying:
-            task_id = flight.result.id
-            begun = self._server.exists(starts_key(task_id))
-            held = self._server.exists(lease_key(task_id))
+            begun = self._server.exists(starts_key(flight.task_id))
+            held = self._server.exists(lease_key(flight.task_id))
             gone = begun and not held and now - flight.sent_at > EXPIRE_S
-            if (gone or (restarted and not held)) and not flight.result.ready():
+            if (gone or (restarted and not held)) and not self._is_done(flight):
                 self._send(flight.order)
                 flight.sent_at = now
 

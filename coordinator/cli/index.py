@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from contracts.config import DESCRIPTORS, DETECTORS, CodebookConfig, FeatureConfig, IndexConfig
+from contracts.config import (
+    DESCRIPTORS,
+    DETECTORS,
+    CodebookConfig,
+    FeatureConfig,
+    IndexConfig,
+    North,
+)
 from contracts.errors import BadConfig
 from coordinator.cli.lists import Broker, Workers, names
 from coordinator.cli.show import bars, complain, list_skipped, tell
@@ -31,7 +38,7 @@ def command(
     ] = None,
     crs: Annotated[str | None, typer.Option(help="CRS of a pose table, such as EPSG:2154.")] = None,
     north: Annotated[
-        str | None, typer.Option(help="What headings are measured from: grid, true or magnetic.")
+        North | None, typer.Option(help="What headings are measured from: grid, true or magnetic.")
     ] = None,
     no_pose: Annotated[bool, typer.Option("--no-pose", help="Index images without poses.")] = False,
     survey_format: Annotated[
@@ -62,15 +69,11 @@ def command(
     from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
     from survey import ReadOptions
 
-    if north not in (None, "grid", "true", "magnetic"):
-        raise BadConfig(f"--north takes grid, true or magnetic; got {north!r}")
     config = IndexConfig(
         features=FeatureConfig.of(
             detectors=names(detectors),
             descriptors=names(descriptors),
             max_frames=max_frames,
-            use_masks=not no_masks,
-            make_upright=not stored_rotation,
         ),
         codebooks=CodebookConfig.of(max_words=max_words, seed=seed),
     )
@@ -81,6 +84,8 @@ def command(
         include=tuple(include or ()),
         exclude=tuple(exclude or ()),
         format=survey_format,
+        make_upright=not stored_rotation,
+        use_masks=not no_masks,
     )
     started = time.perf_counter()
     root = index.absolute()

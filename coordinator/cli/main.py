@@ -1,10 +1,10 @@
 """Puts the verbs together and maps errors to exit codes."""
 
-import logging
 import sys
+from collections.abc import Callable
+from functools import wraps
 from typing import Annotated
 
-import click
 import typer
 
 from contracts.errors import FlaneurError, WrongInput
@@ -13,40 +13,41 @@ from coordinator.cli.show import complain
 
 FAILED, WRONG_USAGE = 1, 2
 
-app = typer.Typer(
+
+def _guarded(command: Callable[..., int | None]) -> Callable[..., None]:
+    """A verb whose errors become messages and exit codes, with a traceback only for `--debug`."""
+
+    @wraps(command)
+    def run(*arguments: object, **options: object) -> None:
+        try:
+            code = command(*arguments, **options)
+        except KeyboardInterrupt:
+            complain("Stopped. What is done stays done: run the same command again to go on.")
+            code = FAILED
+        except (FlaneurError, OSError) as error:
+            if "--debug" in sys.argv:
+                raise
+            complain(str(error))
+            code = WRONG_USAGE if isinstance(error, WrongInput) else FAILED
+        raise typer.Exit(code or 0)
+
+    return run
+
+
+main = typer.Typer(
     name="flaneur",
-    help="Finds where a photograph was taken, against a posed street-level survey.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for verb in (demo, index, locate, train, evaluate, worker):
-    app.command(verb.NAME)(verb.command)
+    main.command(verb.NAME)(_guarded(verb.command))
 
 
-@app.callback()
+@main.callback()
 def options(
-    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show tracebacks (before the verb).")
+    ] = False,
 ) -> None:
     """Finds where a photograph was taken, against a posed street-level survey."""
-    if debug:
-        logging.basicConfig(level=logging.DEBUG)
-
-
-def main() -> None:
-    """Run the command line; never shows a traceback unless asked with `--debug`."""
-    debug = "--debug" in sys.argv[1:]
-    try:
-        code = app(standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        code = WRONG_USAGE
-    except (click.Abort, KeyboardInterrupt):
-        complain("Stopped. What is done stays done: run the same command again to go on.")
-        code = FAILED
-    except (FlaneurError, OSError) as error:
-        if debug:
-            raise
-        complain(str(error))
-        code = WRONG_USAGE if isinstance(error, WrongInput) else FAILED
-    sys.exit(code or 0)

@@ -64,16 +64,16 @@ def image_features(image: PosedImage, config: FeatureConfig) -> tuple[DecodedIma
     """Decode one image as the survey says it is stored, and describe it."""
     decoded = decode_image(
         image.path,
-        quarter_turns=image.quarter_turns if config.make_upright else 0,
+        quarter_turns=image.quarter_turns,
         max_side_px=config.max_side_px,
         max_pixels=config.max_pixels,
     )
     usable: NDArray[np.bool_] | None = None
-    if image.mask_path is not None and config.use_masks:
+    if image.mask_path is not None:
         height, width = decoded.rgb.shape[:2]
         usable = decode_mask(
             image.mask_path,
-            quarter_turns=image.quarter_turns if config.make_upright else 0,
+            quarter_turns=image.quarter_turns,
             width=width,
             height=height,
         )
