@@ -55,6 +55,7 @@ class Follower:
     def __init__(self, app: Celery, run_id: str, in_flight: int, watch: Callable[[], None]) -> None:
         self._app = app
         self._run_id = run_id
+        self._n_begun = 0
         self._in_flight = in_flight
         self._watch = watch
         """Called at every poll; raises if the local workers have died."""
@@ -73,7 +74,7 @@ class Follower:
                 if order is None:
                     exhausted = True
                 else:
-                    flying.append(self._patiently(partial(self._send, order)))
+                    flying.append(self._begin(order))
             if not flying:
                 return
             landed = [flight for flight in flying if self._is_done(flight)]
@@ -101,13 +102,20 @@ class Follower:
                 raise TaskFailed(f"{order.name} {order.key} failed: {outcome.error}")
             yield outcome.order, outcome.value
 
-    def _send(self, order: Order) -> _Flight:
-        task_id = f"{self._run_id}.{order.name}.{order.key}"
+    def _begin(self, order: Order) -> _Flight:
+        self._n_begun += 1  # an engine may run several jobs, whose keys are alike
+        flight = _Flight(order, f"{self._run_id}.{self._n_begun}.{order.name}.{order.key}")
+        self._patiently(partial(self._send, flight))
+        return flight
+
+    def _send(self, flight: _Flight) -> None:
         # The result object is let go: it would listen, and we ask (a bounded number of keys).
         self._app.send_task(
-            f"flaneur.{order.name}", args=[order.message], task_id=task_id, retry=False
+            f"flaneur.{flight.order.name}",
+            args=[flight.order.message],
+            task_id=flight.task_id,
+            retry=False,
         )
-        return _Flight(order, task_id)
 
     def _is_done(self, flight: _Flight) -> bool:
         state = self._patiently(partial(self._app.backend.get_state, flight.task_id))
@@ -132,7 +140,7 @@ class Follower:
             held = self._server.exists(lease_key(flight.task_id))
             gone = begun and not held and now - flight.sent_at > EXPIRE_S
             if (gone or (restarted and not held)) and not self._is_done(flight):
-                self._send(flight.order)
+                self._send(flight)
                 flight.sent_at = now
 
     def _server_run_id(self) -> str:

@@ -52,18 +52,17 @@ def locate_photos(
 
     plain : by the baseline, a bag of words.
     """
-    verb = "plain" if plain else "fused"
     orders = (
         Order(
             "locate",
-            f"{verb}-{number}",
+            str(number),
             {**_message(index, photo, Path(photo), search), "plain": plain},
         )
         for number, photo in enumerate(photos)
     )
     answers: dict[int, Located] = {}
     for outcome in follower.outcomes(orders):
-        number = int(outcome.order.key.removeprefix(f"{verb}-"))
+        number = int(outcome.order.key)
         query = photos[number]
         if outcome.value is None:
             features = (error_feature(query, str(outcome.error)),)

@@ -25,6 +25,8 @@ from survey.synthetic.styles import postcard, restyle
 from survey.synthetic.town import Town, build_town
 
 RELEVANT_WITHIN_M = 40.0
+DARK_GAIN = 0.36
+SENSOR_NOISE = 1.5
 _JPEG = [int(cv2.IMWRITE_JPEG_QUALITY), 90]
 _BEGAN = datetime(2024, 6, 12, 9, 30, tzinfo=timezone(timedelta(hours=2)))
 _README = """A synthetic street-level survey, rendered by Flaneur. The streets do not exist.
@@ -131,12 +133,12 @@ def _expose(rgb: Rgb, wear: str, rng: np.random.Generator) -> Rgb:
     """What the survey's camera makes of a view: exposure, sensor noise, now and then a failure."""
     gain = rng.uniform(0.85, 1.12)
     if wear == "dark":
-        gain *= 0.3
+        gain *= DARK_GAIN
     if wear == "blurred":
         length = int(rng.integers(9, 16))
         rgb = np.asarray(cv2.blur(rgb, (length, 3)), dtype=np.uint8)
     # Noise of one tile, repeated: drawing a fresh one for every pixel costs more than the view.
-    tile = rng.normal(0, 3.0 if wear != "dark" else 6.0, (128, 128, 3))
+    tile = rng.normal(0, SENSOR_NOISE, (128, 128, 3))
     repeats = (rgb.shape[0] // 128 + 1, rgb.shape[1] // 128 + 1, 1)
     noise = np.tile(tile.astype(np.float32), repeats)[: rgb.shape[0], : rgb.shape[1]]
     exposed = rgb.astype(np.float32) * np.float32(gain) + noise

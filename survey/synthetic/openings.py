@@ -17,6 +17,9 @@ SIGNS = (
 GOODS: tuple[Colour, ...] = (
     (188, 150, 96), (150, 62, 48), (206, 196, 172), (78, 104, 76), (64, 84, 118), (120, 88, 60),
 )  # fmt: skip
+CLOTHS: tuple[Colour, ...] = (
+    (222, 216, 200), (196, 184, 150), (160, 74, 64), (108, 126, 142), (206, 188, 120),
+)  # fmt: skip
 INTERIORS: tuple[Colour, ...] = ((96, 82, 62), (58, 60, 66), (112, 92, 66), (70, 58, 50))
 
 
@@ -46,12 +49,9 @@ def _draw_glass(
     across, down = window.panes
     bar = 0.07 if across < 4 else 0.05
     wide, high = (right - left - bar) / across, (top - bottom - bar) / down
-    curtain, depth = rng.random(), rng.uniform(0.25, 1.0)
     for i in range(across):
         for j in range(down):
-            tone = shaded(window.glass, 0.75 + 0.16 * j + rng.uniform(0, 0.5))
-            drawn = curtain < 0.45 and (i in (0, across - 1)) and j >= down * (1 - depth)
-            colour = shaded((196, 192, 180), rng.uniform(0.72, 0.9)) if drawn else tone
+            colour = shaded(window.glass, 0.75 + 0.16 * j + rng.uniform(0, 0.5))
             x0, y0 = left + bar + i * wide, bottom + bar + j * high
             x1, y1 = x0 + wide - bar, y0 + high - bar
             canvas.rect(x0, y0, x1, y1, colour)
@@ -60,6 +60,38 @@ def _draw_glass(
                 canvas.polygon(
                     [(x0, y1), (x0 + 0.45 * (x1 - x0), y1), (x0, y0 + 0.3 * (y1 - y0))], glare
                 )
+    _draw_household(canvas, box, rng)
+    for i in range(across + 1):
+        canvas.rect(left + i * wide, bottom, left + i * wide + bar, top, window.frame)
+    for j in range(down + 1):
+        canvas.rect(left, bottom + j * high, right, bottom + j * high + bar, window.frame)
+
+
+def _draw_household(
+    canvas: Canvas, box: tuple[float, float, float, float], rng: np.random.Generator
+) -> None:
+    """Draw what people put behind their panes: a blind, curtains, a plant, a lamp."""
+    left, bottom, right, top = box
+    kind, wide, high = int(rng.integers(7)), right - left, top - bottom
+    cloth = shaded(CLOTHS[int(rng.integers(len(CLOTHS)))], rng.uniform(0.75, 1.1))
+    if kind == 0:
+        canvas.rect(left, top - rng.uniform(0.2, 0.75) * high, right, top, cloth)
+    elif kind in (1, 2):
+        part = rng.uniform(0.18, 0.42, 2) * wide
+        tie = bottom + rng.uniform(0.2, 0.6) * high
+        for edge, reach in ((left, float(part[0])), (right, -float(part[1]))):
+            outline = [(edge, top), (edge + 1.4 * reach, top), (edge + 0.35 * reach, tie)]
+            canvas.polygon([*outline, (edge + 0.8 * reach, bottom), (edge, bottom)], cloth)
+    elif kind == 3:
+        canvas.rect(left, bottom, right, bottom + rng.uniform(0.25, 0.55) * high, cloth)
+    elif kind == 4:
+        stem = rng.uniform(left + 0.2 * wide, right - 0.2 * wide)
+        for _ in range(14):
+            x, y = rng.normal(stem, 0.12 * wide), bottom + rng.uniform(0.15, 0.55) * high
+            canvas.disc(
+                float(np.clip(x, left + 0.06, right - 0.06)), y, (0.07, 0.05), (84, 120, 70)
+            )
+        canvas.rect(stem - 0.1, bottom, stem + 0.1, bottom + 0.15 * high, (170, 98, 66))
 
 
 def _draw_surround(canvas: Canvas, box: tuple[float, float, float, float], make: Template) -> None:

@@ -18,7 +18,9 @@ HALFTONE_CELL_PX = 4.0
 HALFTONE_DEPTH = 0.4
 HALFTONE_SCAN_BLUR_PX = 1.0
 ENGRAVING_PITCH_PX = 4.0
-ENGRAVING_DEPTH = 0.4
+ENGRAVING_DEPTH = 0.5
+ENGRAVING_WASH = 0.6
+ENGRAVING_OUTLINE = 9.0
 ENGRAVING_SCAN_BLUR_PX = 0.9
 NIGHT_LIGHT = 0.4
 NIGHT_NOISE = 4.5
@@ -132,10 +134,10 @@ def _engraving(rgb: Rgb, rng: np.random.Generator) -> Rgb:
     grey = cv2.GaussianBlur(_grey(rgb), (0, 0), 1.0)
     shape = grey.shape
     fine, broad = cv2.GaussianBlur(grey, (0, 0), 0.8), cv2.GaussianBlur(grey, (0, 0), 2.4)
-    outline = np.clip((broad - fine - 0.015) * 14, 0, 1)
+    outline = np.clip((broad - fine - 0.02) * ENGRAVING_OUTLINE, 0, 1)
     rows, cols = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
     wave = noise(shape, 70, rng) * 1.6 + noise(shape, 25, rng) * 0.4
-    ink = outline
+    ink = np.maximum(outline, ENGRAVING_WASH * (1 - grey))
     # Each further set of lines, in another direction, begins at a darker tone.
     for angle_deg, begins in ((8.0, 0.15), (-48.0, 0.5), (62.0, 0.72)):
         angle = np.radians(angle_deg)

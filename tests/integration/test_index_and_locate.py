@@ -223,3 +223,12 @@ def test_a_killed_worker_process_loses_nothing(
     assert killer.killed
     assert report.generation.n_images == 10
     assert segment_digests(root) == segment_digests(indexed[0])
+
+
+def test_one_engine_can_run_several_jobs(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path, engine: Engine
+) -> None:
+    """Their tasks have the same keys; results of one must not be taken for the other's."""
+    report = index(small_survey, tmp_path, engine)
+    assert report.images_extracted == 10
+    assert segment_digests(tmp_path) == segment_digests(indexed[0])
