@@ -37,12 +37,14 @@ def run_worker(
     import faiss
 
     from retrieval.features import compile_kernels
+    from retrieval.warm import compile_search_kernels
     from workers import tasks  # noqa: F401 - registers the tasks before processes are forked
     from workers.app import app
 
     cv2.setNumThreads(1)
     faiss.omp_set_num_threads(1)
     compile_kernels()
+    compile_search_kernels()
     app.conf.update(broker_url=broker_url, result_backend=broker_url)
     if with_parent:
         threading.Thread(target=_stop_with_parent, args=(broker_url,), daemon=True).start()
