@@ -54,10 +54,13 @@ def run(data: Path) -> None:
     survey = data / "stereopolis-paris6"
     with tempfile.TemporaryDirectory() as scratch, running_engine(None, None) as engine:
         queries = second_pass(survey, Path(scratch))
-        rows = []
+        rows: list[tuple[str, ...]] = []
+        indices: dict[ReadOptions, tuple[OpenedIndex, str, str]] = {}
         for name, options, search, plain in ABLATIONS:
-            root = Path(scratch) / f"index-{len(rows)}"
-            index, rate, size = index_first_pass(survey, root, options, engine)
+            if options not in indices:
+                root = Path(scratch) / f"index-{len(indices)}"
+                indices[options] = index_first_pass(survey, root, options, engine)
+            index, rate, size = indices[options]
             with bars() as progress:
                 progress.begin("locate", len(queries), 0)
                 located = locate_photos(

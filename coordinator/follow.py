@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from celery import Celery, states
 from redis import Redis, RedisError
 
-from contracts.errors import BrokerUnreachable, TaskFailed
+from contracts.errors import BadConfig, BadIndex, BrokerUnreachable, TaskFailed
 from workers.lease import EXPIRE_S, lease_key, starts_key
 
 T = TypeVar("T")
@@ -42,11 +42,15 @@ class _Flight:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came back of an order: `value`, or `error` where its task failed."""
+    """What came back of an order: `value`, or `error` where its task failed.
+
+    wrong_index : the failure, where it is the index's or the options' and so every task's.
+    """
 
     order: Order
     value: dict[str, Any] | None
     error: str | None
+    wrong_index: BadIndex | BadConfig | None = None
 
 
 class Follower:
@@ -94,9 +98,11 @@ class Follower:
 
         Raises
         ------
-        TaskFailed : names the task and says why.
+        TaskFailed : names the task and says why. BadIndex, BadConfig : as the task found.
         """
         for outcome in self.outcomes(orders):
+            if outcome.wrong_index is not None:
+                raise outcome.wrong_index
             if outcome.value is None:
                 order = outcome.order
                 raise TaskFailed(f"{order.name} {order.key} failed: {outcome.error}")
@@ -127,7 +133,8 @@ class Follower:
         value = meta["result"]
         if meta["status"] == states.SUCCESS:
             return Outcome(flight.order, value, None)
-        return Outcome(flight.order, None, f"{type(value).__name__}: {value}")
+        wrong_index = value if isinstance(value, BadIndex | BadConfig) else None
+        return Outcome(flight.order, None, f"{type(value).__name__}: {value}", wrong_index)
 
     def _send_lost(self, flying: Iterable[_Flight]) -> None:
         """Send again what was begun and is held no longer, and all if the server lost its data."""

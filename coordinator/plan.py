@@ -1,18 +1,22 @@
 """Planning: surveys become one ordered list of images, cut into shards of minutes of work."""
 
 import hashlib
-import os
+import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from contracts.config import IndexConfig
-from contracts.errors import BadIndex, BadSurvey, UnknownCrs
+from contracts.errors import BadConfig, BadIndex, BadSurvey, UnknownCrs
 from contracts.records import PosedImage, Skipped
 from index.jobs import JobFolder, JobPlan
 from survey import ReadOptions, Survey, read_survey
 
+_JOB_ID = re.compile(r"[0-9a-f]{16}")
 DEFAULT_SHARD_SIZE = 32
 """Images a shard: half a minute of one core, so that a lost worker costs little."""
 
@@ -44,7 +48,11 @@ def read_surveys(sources: Sequence[tuple[str, Path]], options: ReadOptions) -> I
     Raises
     ------
     BadSurvey : one is empty or no survey. UnknownCrs : they have different CRSs.
+    BadConfig : two have the same name.
     """
+    name, count = Counter(name for name, _ in sources).most_common(1)[0]
+    if count > 1:
+        raise BadConfig(f"--also names {name!r} {count} times; give each survey its own name.")
     surveys = tuple(
         NamedSurvey(name, path, read_survey(path, _renamed(options, name)))
         for name, path in sources
@@ -88,15 +96,15 @@ def make_plan(
     The job's id is a digest of every image's uri, pose, size and time of change, and of the
     configuration: the same survey comes back to the same job, a changed one gets a new job.
     A job keeps the shard size it was begun with.
+
+    Raises
+    ------
+    BadIndex : `root` is a file or another folder's, or the plan of a job in it is damaged.
     """
     job = JobFolder(root, _job_id(intake, config))
     if job.has_plan():
-        return job, job.read_plan()
-    if root.exists() and not (root / "jobs").is_dir() and any(root.iterdir()):
-        raise BadIndex(
-            f"{root} is not empty and not a Flaneur index; nothing was written there. "
-            "Name a new folder."
-        )
+        return job, _plan_of(job)
+    _refuse_foreign(root)
     shards = [
         intake.images[start : start + shard_size]
         for start in range(0, len(intake.images), shard_size)
@@ -114,6 +122,38 @@ def make_plan(
     return job, plan
 
 
+def _refuse_foreign(root: Path) -> None:
+    if root.exists() and not root.is_dir():
+        raise BadIndex(f"{root} is a file; an index is a folder. Name a new one.")
+    if root.exists() and not _jobs(root) and any(root.iterdir()):
+        raise BadIndex(
+            f"{root} is not empty and not a Flaneur index; nothing was written there. "
+            "Name a new folder."
+        )
+
+
+def _jobs(root: Path) -> list[JobFolder]:
+    """The jobs begun in an index; what else lies in its `jobs/` is not ours."""
+    names = sorted(path.name for path in (root / "jobs").glob("*") if path.is_dir())
+    return [JobFolder(root, name) for name in names if _JOB_ID.fullmatch(name)]
+
+
+def _plan_of(job: JobFolder) -> JobPlan:
+    try:
+        plan = job.read_plan()
+    except ValidationError as error:
+        raise BadIndex(
+            f"{job.path / 'plan.json'} is damaged ({error.errors()[0]['msg']}). Remove the folder "
+            f"{job.path} and index again."
+        ) from error
+    if not re.fullmatch("[0-9]{4,9}", plan.segment):  # it names folders that are written to
+        raise BadIndex(
+            f"{job.path / 'plan.json'} names the segment {plan.segment!r}, expected a number. "
+            f"Remove the folder {job.path} and index again."
+        )
+    return plan
+
+
 def _job_id(intake: Intake, config: IndexConfig) -> str:
     digest = hashlib.sha256(config.digest().encode())
     for image in intake.images:
@@ -124,9 +164,5 @@ def _job_id(intake: Intake, config: IndexConfig) -> str:
 
 def _free_segment(root: Path) -> str:
     """The next number that no job has taken."""
-    taken = [
-        int(JobFolder(root, entry.name).read_plan().segment)
-        for entry in (os.scandir(root / "jobs") if (root / "jobs").is_dir() else ())
-        if JobFolder(root, entry.name).has_plan()
-    ]
+    taken = [int(_plan_of(job).segment) for job in _jobs(root) if job.has_plan()]
     return f"{max(taken, default=0) + 1:04d}"

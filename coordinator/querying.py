@@ -64,6 +64,8 @@ def locate_photos(
     for outcome in follower.outcomes(orders):
         number = int(outcome.order.key)
         query = photos[number]
+        if outcome.wrong_index is not None:
+            raise outcome.wrong_index
         if outcome.value is None:
             features = (error_feature(query, str(outcome.error)),)
             answers[number] = Located(query, features, 0.0)
@@ -125,6 +127,8 @@ def _in_order(
 ) -> list[Json]:
     answers: dict[int, Json] = {}
     for outcome in follower.outcomes(orders):
+        if outcome.wrong_index is not None:
+            raise outcome.wrong_index
         if outcome.value is None:
             query = outcome.order.message["query"]
             raise TaskFailed(f"{query} could not be searched for: {outcome.error}")

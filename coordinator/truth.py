@@ -1,10 +1,12 @@
 """Ground truth: query path -> the images of the index that show its place."""
 
 import json
-from collections import defaultdict
+import unicodedata
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -33,13 +35,15 @@ def read_truth(path: Path, root: Path | None, uris: Sequence[str]) -> list[Judge
     BadTruth : not such an object, or a reference that names no image or several.
     """
     try:
-        content = _TRUTH.validate_python(json.loads(path.read_bytes()), strict=True)
+        content = _TRUTH.validate_python(
+            json.loads(path.read_bytes(), object_pairs_hook=_object), strict=True
+        )
     except OSError as error:
         raise BadTruth(f"{path} cannot be read: {error.strerror}.") from error
-    except (ValidationError, ValueError) as error:
+    except (ValueError, RecursionError) as error:  # pydantic's errors are ValueErrors
         raise BadTruth(
             f"{path} is not a ground truth: expected one JSON object, query path -> list of "
-            f"relevant references ({str(error).splitlines()[0]})."
+            f"relevant references ({_what_is_wrong(error)})."
         ) from error
     folder = root or path.parent
     resolve = _Resolver(uris)
@@ -49,6 +53,25 @@ def read_truth(path: Path, root: Path | None, uris: Sequence[str]) -> list[Judge
         )
         for query, refs in content.items()
     ]
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; of two equal keys Python would silently keep the last."""
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        twice = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
+        raise ValueError(f"{twice!r} is there twice; put its references into one list")
+    return content
+
+
+def _what_is_wrong(error: Exception) -> str:
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        where = ", ".join(repr(part) for part in first["loc"])
+        return f"{where}: {first['msg']}" if where else str(first["msg"])
+    return str(error)
 
 
 class _Resolver:
@@ -61,6 +84,7 @@ class _Resolver:
             self._by_name[uri.rsplit("/", 1)[-1]].append(image_id)
 
     def image_id(self, query: str, reference: str) -> int:
+        reference = unicodedata.normalize("NFC", reference)  # as the uris are
         candidates = self._by_name.get(reference.rsplit("/", 1)[-1], [])
         exact = [each for each in candidates if self._uris[each] == reference]
         found = exact or [each for each in candidates if _ends(self._uris[each], reference)]

@@ -77,8 +77,11 @@ def _unusable(entry: os.DirEntry[str], real_root: str) -> str | None:
     """Why an entry is left out; "" if it is a good file, None if it is of no interest."""
     is_image = os.path.splitext(entry.name)[1].lower() in IMAGE_SUFFIXES  # noqa: PTH122
     linked = entry.is_symlink()
-    if not is_image and not (linked and entry.is_dir()):
+    # `os.path.isdir` answers False to a link that leads to itself; the entry's own raises.
+    if not is_image and not (linked and os.path.isdir(entry.path)):  # noqa: PTH112
         return None
+    if not _is_utf8(entry.path):
+        return "its path is not UTF-8 and cannot be written into an index; rename it"
     if linked:
         target = os.path.realpath(entry.path)
         if os.path.commonpath([real_root, target]) != real_root:
@@ -90,6 +93,14 @@ def _unusable(entry: os.DirEntry[str], real_root: str) -> str | None:
     except OSError as error:
         return f"cannot be looked up: {error.strerror}"
     return "" if stat.S_ISREG(mode) else "not a regular file"
+
+
+def _is_utf8(path: str) -> bool:
+    try:
+        path.encode()
+    except UnicodeEncodeError:  # Python keeps a foreign byte as a lone surrogate
+        return False
+    return True
 
 
 def _add(found: dict[str, str], skipped: list[Skipped], uri: str, path: str) -> None:

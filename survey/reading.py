@@ -9,6 +9,7 @@ import numpy as np
 
 from contracts.errors import BadSurvey
 from contracts.records import Pose, PosedImage, Skipped
+from geo.crs import ToWgs84
 from survey.options import Reading, ReadOptions, Survey, selector
 from survey.poses import crs_name, outside_area
 from survey.readers import choose_reader
@@ -23,8 +24,8 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
     Raises
     ------
     BadSurvey : nothing there, no image, no pose where poses are wanted, or metadata that does
-        not hold. UnknownCrs : coordinates whose system is missing or unknown. BadConfig :
-        `options.format` names no reader.
+        not hold. UnknownCrs : coordinates whose system is missing, unknown or has no exact
+        conversion to WGS 84. BadConfig : `options.format` names no reader.
     """
     path = Path(path)
     if options.crs is not None:
@@ -42,6 +43,7 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
         reading = replace(reading, images=bare, crs=None)
     reading = _only(reading, wanted)
     if reading.crs is not None:
+        ToWgs84(reading.crs)  # refused now, not when the first photo is to be placed
         reading = _inside_area(reading, path)
     if not reading.images:
         raise BadSurvey(_why_empty(path, reading.skipped, options))

@@ -116,9 +116,12 @@ def _match(
     images: list[PosedImage] = []
     skipped: list[Skipped] = []
     row_of: dict[str, int] = {}
+    told = {skip.uri for skip in listing.skipped} - listing.paths.keys()
     for number, cells in table.rows:
         name = _cell(cells, columns.file)
         uri = local_uri(name)
+        if uri in told:  # the file is there and its own reason is known
+            continue
         image = _posed(uri, cells, columns, frame, listing)
         if isinstance(image, PosedImage) and uri in row_of:
             image = f"the same image as row {row_of[uri]}, which counts; remove one"

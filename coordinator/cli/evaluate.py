@@ -15,8 +15,10 @@ from coordinator.cli.lists import (
     Vote,
     Weights,
     Workers,
+    check_search,
     search_config,
 )
+from coordinator.cli.outputs import result_folder
 from coordinator.cli.show import bars, complain
 
 NAME = "evaluate"
@@ -42,25 +44,33 @@ def command(
     """Search for every query of a ground truth and score the rankings."""
     from coordinator.engine import running_engine
     from coordinator.evaluating import report_of, table_of
+    from coordinator.export.files import write_whole
     from coordinator.querying import judge_queries
     from coordinator.truth import read_truth
-    from index.files import write_bytes
     from index.opened import OpenedIndex
 
     search = search_config(pair, k, vote, weights, descriptors, top=10)
     opened = OpenedIndex(index.absolute())
+    check_search(search, opened.config.features)
+    out = None if out is None else result_folder(out)
     queries = read_truth(truth, root, opened.catalogue.column("uri"))
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
         progress.begin("evaluate", len(queries), 0)
         answers = judge_queries(
             opened, queries, search, engine.follower, lambda: progress.advance("evaluate")
         )
+    for answer in answers:
+        if "error" in answer:
+            complain(f"{answer['query']}: {answer['error']}")
     report = report_of(answers, opened, search)
     text = json.dumps(report, ensure_ascii=False, allow_nan=False)
     if out is not None:
-        write_bytes(out.absolute() / "report.json", text.encode())
-        write_bytes(out.absolute() / "report.md", table_of(report).encode())
-    typer.echo(text if as_json else table_of(report))
-    for unreadable in report["unreadable"]:
-        complain(f"{unreadable['query']}: {unreadable['error']}")
+        write_whole(out / "report.json", _utf_8(text))
+        write_whole(out / "report.md", _utf_8(table_of(report)))
+    typer.echo(_utf_8(text if as_json else table_of(report)))
     return SOME_SKIPPED if report["unreadable"] else 0
+
+
+def _utf_8(text: str) -> bytes:
+    """UTF-8 in every locale; a byte of a name that is not UTF-8 as its (JSON) escape."""
+    return text.encode("utf-8", "backslashreplace")

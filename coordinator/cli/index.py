@@ -2,6 +2,7 @@
 
 import json
 import time
+import unicodedata
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +17,7 @@ from contracts.config import (
     North,
 )
 from contracts.errors import BadConfig
-from coordinator.cli.lists import Broker, Workers, names
+from coordinator.cli.lists import Broker, Workers, names_among
 from coordinator.cli.show import bars, complain, list_skipped, tell
 
 NAME = "index"
@@ -71,8 +72,8 @@ def command(
 
     config = IndexConfig(
         features=FeatureConfig.of(
-            detectors=names(detectors),
-            descriptors=names(descriptors),
+            detectors=names_among(detectors, DETECTORS, "--detectors"),
+            descriptors=names_among(descriptors, DESCRIPTORS, "--descriptors"),
             max_frames=max_frames,
         ),
         codebooks=CodebookConfig.of(max_words=max_words, seed=seed),
@@ -89,7 +90,7 @@ def command(
     )
     started = time.perf_counter()
     root = index.absolute()
-    intake = read_surveys([("", survey), *map(_named, also or ())], options)
+    intake = read_surveys([("", survey.absolute()), *map(_named, also or ())], options)
     job, plan = make_plan(root, intake, config, shard_size or DEFAULT_SHARD_SIZE)
     tell(f"{len(intake.images)} images in {plan.n_shards} shards; job {plan.job}")
     with bars() as progress:
@@ -111,7 +112,7 @@ def command(
         "images_per_second": round(report.images_extracted / seconds, 3),
     }
     if as_json:
-        typer.echo(json.dumps(summary, ensure_ascii=False))
+        typer.echo(json.dumps(summary, ensure_ascii=False).encode())  # UTF-8 in every locale
     else:
         tell(_sentence(summary, root))
     return SOME_SKIPPED if report.skipped else 0
@@ -119,9 +120,9 @@ def command(
 
 def _named(text: str) -> tuple[str, Path]:
     name, separator, path = text.partition("=")
-    if not (separator and name and path) or "/" in name:
+    if not (separator and name and path) or "/" in name or name in {".", ".."}:
         raise BadConfig(f"--also takes NAME=SURVEY, with no / in NAME; got {text!r}")
-    return name, Path(path)
+    return unicodedata.normalize("NFC", name), Path(path).absolute()
 
 
 def _sentence(summary: dict[str, object], root: Path) -> str:

@@ -1,11 +1,20 @@
 """Options that take lists or alternatives, shared by the verbs."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
-from contracts.config import SearchConfig
+from contracts.config import (
+    DESCRIPTORS,
+    DETECTORS,
+    MAX_NEIGHBOURS,
+    FeatureConfig,
+    SearchConfig,
+    Weight,
+)
+from contracts.config import Vote as VoteName
 from contracts.errors import BadConfig
 
 Broker = Annotated[
@@ -36,6 +45,22 @@ def names(text: str | None) -> tuple[str, ...]:
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
+def names_among(text: str | None, known: Sequence[str], option: str) -> tuple[str, ...]:
+    """Split a comma-separated option whose values are known, each to be named once.
+
+    Raises
+    ------
+    BadConfig : a value is unknown or there twice; names it and what is known.
+    """
+    chosen = names(text)
+    for at, name in enumerate(chosen):
+        if name not in known:
+            raise BadConfig(f"{option} takes any of {','.join(known)}; got {name!r}")
+        if name in chosen[:at]:
+            raise BadConfig(f"{option} names {name} twice; once is enough")
+    return chosen
+
+
 def search_config(
     pair: str, k: str, vote: str, weights: str, descriptors: str | None, top: int
 ) -> SearchConfig:
@@ -45,13 +70,40 @@ def search_config(
     ------
     BadConfig : an option does not hold; names it.
     """
-    if k != "auto" and not k.isdigit():
-        raise BadConfig(f"--k takes auto or a whole number from 1 to 10; got {k!r}")
+    if k not in {"auto", *map(str, range(1, MAX_NEIGHBOURS + 1))}:
+        raise BadConfig(f"--k takes auto or a whole number from 1 to {MAX_NEIGHBOURS}; got {k!r}")
+    if vote not in get_args(VoteName):
+        raise BadConfig(f"--vote takes one of {', '.join(get_args(VoteName))}; got {vote!r}")
     return SearchConfig.of(
-        pair="auto" if pair == "auto" else names(pair),
+        pair="auto" if pair == "auto" else names_among(pair, DETECTORS, "--pair"),
         k="auto" if k == "auto" else int(k),
         vote=vote,
-        weights=names(weights),
-        descriptors=names(descriptors) or None,
+        weights=names_among(weights, get_args(Weight), "--weights"),
+        descriptors=names_among(descriptors, DESCRIPTORS, "--descriptors") or None,
         top=top,
     )
+
+
+def check_search(search: SearchConfig, indexed: FeatureConfig) -> None:
+    """Refuse a search for what was not indexed, before a worker is started for it.
+
+    Raises
+    ------
+    BadConfig : names what is missing and what the index has.
+    """
+    if search.vote == "pairwise" and len(search.descriptors or indexed.descriptors) < 2:
+        raise BadConfig(
+            "--vote pairwise compares descriptors and there is only one here; "
+            "use --vote intersection"
+        )
+    pair = () if search.pair == "auto" else search.pair
+    for option, asked, has in (
+        ("--pair", pair, indexed.detectors),
+        ("--descriptors", search.descriptors or (), indexed.descriptors),
+    ):
+        missing = [name for name in asked if name not in has]
+        if missing:
+            raise BadConfig(
+                f"{option}: the index has no {', '.join(missing)}; it was made with "
+                f"{', '.join(has)}. Choose from these or index again."
+            )

@@ -14,8 +14,10 @@ from coordinator.cli.lists import (
     Vote,
     Weights,
     Workers,
+    check_search,
     search_config,
 )
+from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
 
 NAME = "locate"
@@ -44,6 +46,9 @@ def command(
 
     search = search_config(pair, k, vote, weights, descriptors, top)
     opened = OpenedIndex(index.absolute())
+    check_search(search, opened.config.features)
+    photos = list(dict.fromkeys(photos))  # globs overlap; a feature's id is of its photo's name
+    out = None if out is None else result_file(out, map(Path, photos))
     count = min(workers or len(photos), len(photos)) if broker is None else None
     with running_engine(broker, _at_most_cores(count), ("locate",)) as engine, bars() as progress:
         progress.begin("locate", len(photos), 0)
@@ -53,7 +58,7 @@ def command(
     features = [feature for answer in located for feature in answer.features]
     collection = feature_collection(features)
     if out is None:
-        typer.echo(dumps(collection))
+        typer.echo(dumps(collection).encode())  # UTF-8 in every locale
     else:
         write_geojson(out, collection)
     failed = [answer for answer in located if answer.error is not None]

@@ -1,5 +1,6 @@
 """Puts the verbs together and maps errors to exit codes."""
 
+import errno
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -27,11 +28,28 @@ def _guarded(command: Callable[..., int | None]) -> Callable[..., None]:
         except (FlaneurError, OSError) as error:
             if "--debug" in sys.argv:
                 raise
-            complain(str(error))
+            complain(_of_system(error) if isinstance(error, OSError) else str(error))
             code = WRONG_USAGE if isinstance(error, WrongInput) else FAILED
+        except Exception as error:
+            if "--debug" in sys.argv:
+                raise
+            complain(
+                f"Flaneur failed in a way it should not: {type(error).__name__}: {error}. Please "
+                "report it with what this prints: flaneur --debug, then the same verb and options."
+            )
+            code = FAILED
         raise typer.Exit(code or 0)
 
     return run
+
+
+def _of_system(error: OSError) -> str:
+    """The name first, without a number that says nothing."""
+    if error.strerror is None:
+        return str(error)
+    if error.errno == errno.ENOSPC:
+        return f"{error.filename or 'The disk'}: no space left. Make room and run it again."
+    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
 
 
 main = typer.Typer(

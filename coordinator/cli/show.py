@@ -25,12 +25,18 @@ stdout = Console(highlight=False)
 
 def complain(message: str) -> None:
     """An error or a warning, for a person."""
-    stderr.print(message, style="red", markup=False, soft_wrap=True)
+    stderr.print(_harmless(message), style="red", markup=False, soft_wrap=True)
 
 
 def tell(message: str) -> None:
     """A line that is not a result."""
-    stderr.print(message, markup=False, soft_wrap=True)
+    stderr.print(_harmless(message), markup=False, soft_wrap=True)
+
+
+def _harmless(message: str) -> str:
+    """Without what a file's name could make a terminal do."""
+    shown = (char if char.isprintable() or char == "\n" else "\ufffd" for char in message)
+    return "".join(shown)
 
 
 class Bars:

@@ -12,8 +12,10 @@ from coordinator.cli.lists import (
     Vote,
     Weights,
     Workers,
+    check_search,
     search_config,
 )
+from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
 
 NAME = "train"
@@ -37,16 +39,18 @@ def command(
 ) -> int:
     """Fit the model that chooses detectors and k for each photo (Eq. 1 of the paper)."""
     from coordinator.engine import running_engine
+    from coordinator.export.files import write_whole
     from coordinator.querying import rehearse_queries
     from coordinator.training import train_model
     from coordinator.truth import read_truth
-    from index.files import write_bytes
     from index.models import write_model
     from index.opened import OpenedIndex
     from workers.stages.retrieve import KS
 
     search = search_config("auto", "auto", vote, weights, descriptors, top=10)
     opened = OpenedIndex(index.absolute())
+    check_search(search, opened.config.features)
+    out = None if out is None else result_file(out, (truth,))
     queries = read_truth(truth, root, opened.catalogue.column("uri"))
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
         progress.begin("train", len(queries), 0)
@@ -57,7 +61,7 @@ def command(
     if out is None:
         write_model(opened.root, model)
     else:
-        write_bytes(out.absolute(), model.to_json().encode())
+        write_whole(out, model.to_json().encode())
     unreadable = [answer for answer in answers if "error" in answer]
     for answer in unreadable:
         complain(f"{answer['query']}: {answer['error']}")

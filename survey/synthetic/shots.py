@@ -121,12 +121,12 @@ def _take_aim(
     away = float(rng.uniform(0.62, 0.9)) * plan.width_m
     aside = float(rng.uniform(-0.32, 0.32)) * facade.panel.width_m
     spot = facade.middle + away * facade.outward + aside * facade.panel.along
-    eye = plan.ground_m + float(rng.choice([1.6, 1.7, 3.2, 5.0]))
+    eye = plan.ground_m + float(rng.choice([1.6, 1.7, 2.6, 4.0]))
     aim = (
         facade.middle + facade.panel.along * float(rng.uniform(-0.12, 0.12)) * facade.panel.width_m
     )
     ray = aim - spot
-    pitch = float(rng.uniform(5, 12)) - 1.6 * (eye - plan.ground_m - 1.6)
+    pitch = float(rng.uniform(7, 12)) - 1.2 * (eye - plan.ground_m - 1.6)
     return View(
         easting=float(spot[0]),
         northing=float(spot[1]),

@@ -11,19 +11,21 @@ from survey.synthetic.canvas import Rgb
 from survey.synthetic.materials import noise
 
 # How hard each style is; larger is harder.
-SEPIA_BLUR_PX = 0.9
-SEPIA_CONTRAST = 0.65
-SEPIA_GRAIN = 6.0
-HALFTONE_CELL_PX = 4.0
-HALFTONE_DEPTH = 0.4
+SEPIA_BLUR_PX = 0.7
+SEPIA_CONTRAST = 0.75
+SEPIA_GRAIN = 11.0
+SEPIA_GRAIN_PX = 1.0
+SEPIA_PLATE = (0.2, 0.45, 0.35)
+HALFTONE_CELL_PX = 3.7
+HALFTONE_DEPTH = 0.62
 HALFTONE_SCAN_BLUR_PX = 1.0
-ENGRAVING_PITCH_PX = 4.0
-ENGRAVING_DEPTH = 0.5
-ENGRAVING_WASH = 0.6
+ENGRAVING_PITCH_PX = 3.6
+ENGRAVING_DEPTH = 0.66
+ENGRAVING_WASH = 0.63
 ENGRAVING_OUTLINE = 9.0
-ENGRAVING_SCAN_BLUR_PX = 0.9
-NIGHT_LIGHT = 0.4
-NIGHT_NOISE = 4.5
+ENGRAVING_SCAN_BLUR_PX = 0.95
+NIGHT_LIGHT = 0.55
+NIGHT_NOISE = 10.0
 NIGHT_LIT_SHARE = 0.3
 
 Plane = NDArray[np.float32]
@@ -77,12 +79,12 @@ def _vignette(shape: tuple[int, int], depth: float) -> Plane:
 def _sepia(rgb: Rgb, rng: np.random.Generator) -> Rgb:
     shape = rgb.shape[:2]
     # Old plates see blue as bright and red as dark.
-    plate = rgb.astype(np.float32) @ np.array([0.12, 0.38, 0.5], np.float32) / 255
+    plate = rgb.astype(np.float32) @ np.array(list(SEPIA_PLATE), np.float32) / 255
     blurred = cv2.GaussianBlur(plate, (0, 0), SEPIA_BLUR_PX)
     tone = 0.5 + (blurred - 0.5) * SEPIA_CONTRAST + 0.16
     tone = tone + noise(shape, 90, rng) * 0.03 + noise(shape, 250, rng) * 0.04
     tone = tone * _vignette(shape, 0.35)
-    tone = tone + noise(shape, 1.4, rng) * np.float32(SEPIA_GRAIN / 255)
+    tone = tone + noise(shape, SEPIA_GRAIN_PX, rng) * np.float32(SEPIA_GRAIN / 255)
     aged = _inked(np.asarray(1 - tone, dtype=np.float32), (252, 236, 202), (42, 24, 10))
     for _ in range(int(rng.integers(5, 12))):
         x, y = rng.uniform(0, shape[1]), rng.uniform(0, shape[0])

@@ -54,11 +54,21 @@ def test_two_names_that_are_one_in_nfc_are_not_both_taken(tmp_path: Path) -> Non
     assert "NFC" in survey.skipped[0].reason
 
 
-def test_a_name_that_is_not_utf8_is_listed_under_a_name_that_is(tmp_path: Path) -> None:
-    picture(tmp_path / "a.jpg").rename(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.jpg"))
+def test_a_name_that_is_not_utf8_is_skipped_under_a_name_that_is(tmp_path: Path) -> None:
+    """Plans and catalogues are UTF-8 and could not hold its path."""
+    picture(tmp_path / "a.jpg")
+    picture(tmp_path / "b.jpg").rename(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.jpg"))
     survey = read_survey(tmp_path, PLAIN)
-    assert uris(survey) == ["caf\ufffd.jpg"]
-    assert Path(survey.images[0].path).exists()
+    assert uris(survey) == ["a.jpg"]
+    assert survey.skipped[0].uri == "caf\ufffd.jpg"
+    assert "not UTF-8" in survey.skipped[0].reason
+
+
+def test_a_link_to_itself_is_no_obstacle(tmp_path: Path) -> None:
+    picture(tmp_path / "a.jpg")
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "self").symlink_to(".")
+    assert uris(read_survey(tmp_path, PLAIN)) == ["a.jpg"]
 
 
 def test_the_same_name_in_two_folders_is_two_images(tmp_path: Path) -> None:

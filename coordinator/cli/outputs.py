@@ -1,0 +1,45 @@
+"""Where results go: looked at before the work, so that none is lost for want of a place."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from contracts.errors import WrongInput
+
+
+def result_file(out: Path, inputs: Iterable[Path] = ()) -> Path:
+    """Where `out` is written: the file itself, for a symbolic link what it leads to.
+
+    Raises
+    ------
+    WrongInput : it is a folder or a device, lies under a file, or is one of `inputs`.
+    """
+    file = out.resolve()
+    if out.exists() and not file.is_file():
+        raise WrongInput(
+            f"--out {out} is {'a folder' if file.is_dir() else 'no regular file'}; name a file."
+        )
+    for each in inputs:
+        if each.resolve() == file:
+            raise WrongInput(f"--out {out} is one of the inputs; it would be lost. Name another.")
+    _refuse_under_a_file(out, file)
+    return file
+
+
+def result_folder(out: Path) -> Path:
+    """Where a report of several files goes.
+
+    Raises
+    ------
+    WrongInput : it is a file, or lies under one.
+    """
+    folder = out.resolve()
+    if folder.exists() and not folder.is_dir():
+        raise WrongInput(f"--out {out} is a file; name a folder for the report.")
+    _refuse_under_a_file(out, folder)
+    return folder
+
+
+def _refuse_under_a_file(out: Path, path: Path) -> None:
+    above = next(parent for parent in path.parents if parent.exists())
+    if not above.is_dir():
+        raise WrongInput(f"--out {out}: {above} is a file, not a folder; name another place.")
