@@ -43,10 +43,14 @@ ABLATIONS = (
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """An image of the second pass, upright on disk, that has a neighbour in the first pass."""
+    """An image of the second pass, upright on disk, that has a neighbour in the first pass.
+
+    can_be_right : an image of the same camera stands within 5 m, so a first match can be right.
+    """
 
     photo: str
     truth: PosedImage
+    can_be_right: bool
 
 
 def run(data: Path) -> None:
@@ -73,7 +77,10 @@ def run(data: Path) -> None:
                 )
             rows.append((name, *figures(index, queries, located), rate, size))
     where = f"within {NEAR_M:.0f} m of the first pass"
-    print(f"{len(queries)} queries {where}; {engine.n_workers} workers")
+    can = sum(query.can_be_right for query in queries)
+    print(
+        f"{len(queries)} queries {where}, {can} of which can be right; {engine.n_workers} workers"
+    )
     print_table(
         (
             "",
@@ -92,13 +99,14 @@ def second_pass(survey: Path, scratch: Path) -> list[Query]:
     first = read_survey(survey, ReadOptions(include=FIRST_PASS)).images
     queries = []
     for image in read_survey(survey, ReadOptions(include=SECOND_PASS)).images:
-        near = min(metres(image, other) for other in first)
+        same = [other for other in first if other.camera.name == image.camera.name]
+        near = min(metres(image, other) for other in same)
         if near > NEAR_M or image.camera.name == "300":
             continue
         upright = decode_image(image.path, quarter_turns=image.quarter_turns).rgb
         photo = scratch / Path(image.path).name
         cv2.imwrite(str(photo), upright[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])
-        queries.append(Query(str(photo), image))
+        queries.append(Query(str(photo), image, near <= WITHIN_M))
     return queries
 
 
@@ -132,7 +140,8 @@ def figures(
             for estimate in answer.of_kind("estimate")
         ]
     seconds = np.mean([answer.seconds for answer in located])
-    return f"{right / len(queries):.3f}", f"{np.median(errors):.2f}", f"{seconds:.2f}"
+    share = f"{right}/{len(queries)} = {right / len(queries):.3f}"
+    return share, f"{np.median(errors):.2f}", f"{seconds:.2f}"
 
 
 def metres(one: PosedImage, other: PosedImage) -> float:

@@ -36,13 +36,13 @@ def command(
 def _table(report: "DemoReport") -> Table:
     table = Table(title="Where was it taken? Metres from the truth; * = on the right facade")
     for name in ("query", "style", "pair", "k"):
-        table.add_column(name)
+        table.add_column(name, no_wrap=True)
     for name in ("Flaneur", "bag of words", "random"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     for row in report.rows:
         ours = row.flaneur
         table.add_row(
-            row.query.file,
+            row.query.file.split("-")[0],
             row.query.style,
             "-".join(ours.detectors),
             str(ours.k),

@@ -18,6 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from contracts.errors import BadIndex
 from coordinator.cli import main
 from coordinator.cli.show import Bars
 from coordinator.engine import Engine
@@ -125,17 +126,13 @@ def test_damage_that_a_worker_finds_is_told_and_the_worker_lives(
 ) -> None:
     overwrite(damaged / file, start, content)
     photo = [str(small_survey / "00.jpg")]
-    answer = locate_photos(OpenedIndex(damaged), photo, PAIR, engine.follower, lambda: None)[0]
-    assert says in str(answer.error)
-    assert [feature["geometry"] for feature in answer.features] == [None]
+    with pytest.raises(BadIndex) as error:
+        locate_photos(OpenedIndex(damaged), photo, PAIR, engine.follower, lambda: None)
+    assert says in str(error.value)
     again = locate_photos(OpenedIndex(whole), photo, PAIR, engine.follower, lambda: None)[0]
     assert again.error is None
 
 
-@pytest.mark.xfail(
-    reason="coordinator/querying.py takes a worker's BadIndex for a fault of the photo: exit 3",
-    strict=True,
-)
 def test_damage_that_a_worker_finds_is_wrong_input_too(
     damaged: Path, small_survey: Path, engine: Engine
 ) -> None:

@@ -1,16 +1,18 @@
 """The demo's town: where its houses stand and what its cameras see of them."""
 
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from synthetic_town import demo_town
 
 from survey.synthetic.camera import Lens, Panel, View, project
 from survey.synthetic.shots import QueryShot, ShotOptions, SurveyShot, drive, visit
 from survey.synthetic.street import UP, Facade, StreetPlan, lay_out
 from survey.synthetic.styles import STYLES
 from survey.synthetic.templates import TEMPLATES
-from survey.synthetic.town import Town, build_town
+from survey.synthetic.town import Town
 from survey.synthetic.visibility import shares_seen
 
 PLAN = StreetPlan()
@@ -19,7 +21,7 @@ OPTIONS = ShotOptions()
 
 @pytest.fixture(scope="module")
 def town() -> Town:
-    return build_town(PLAN, 0)
+    return demo_town()
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +64,7 @@ def test_houses_of_a_row_stand_wall_to_wall() -> None:
         rows.setdefault((facade.street, facade.inner), []).append(facade)
     assert len(rows) == 8
     for (_, inner), row in rows.items():
-        for one, following in zip(row[:-1], row[1:], strict=True):
+        for one, following in pairwise(row):
             meets = one.panel.point(one.panel.width_m if inner else 0, 0)
             starts = following.panel.point(0 if inner else following.panel.width_m, 0)
             assert np.linalg.norm(meets - starts) < 1e-6
