@@ -18,7 +18,7 @@ check: $(STAMP)  ## What CI runs: format, lint, types, import direction, tests
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest
+	$(MAKE) test
 
 bench: $(STAMP)  ## Figures on real images (FLANEUR_TEST_DATA), by hand
 	$(BIN)/python -m benchmarks

@@ -28,6 +28,7 @@ from workers.run import worker_environment
 
 BROKER_VARIABLE = "FLANEUR_BROKER_URL"
 ANSWER_S = 5.0
+LISTEN_TRIES = 3
 RESTARTS = 3
 
 
@@ -101,7 +102,10 @@ def without_password(url: str) -> str:
 
 
 def _listening_processes(app: Celery, url: str) -> int:
-    stats = app.control.inspect(timeout=2.0).stats() or {}
+    for _ in range(LISTEN_TRIES):  # a worker that just started needs a moment to answer
+        stats = app.control.inspect(timeout=2.0).stats() or {}
+        if stats:
+            break
     count = sum(len(worker.get("pool", {}).get("processes", [])) or 1 for worker in stats.values())
     if not count:
         raise BrokerUnreachable(

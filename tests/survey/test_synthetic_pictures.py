@@ -11,7 +11,7 @@ from synthetic_town import demo_town
 
 from contracts.errors import BadConfig
 from survey.synthetic import DemoSurvey, render_survey
-from survey.synthetic.camera import Panel, View, project
+from survey.synthetic.camera import Floats, Panel, View, project
 from survey.synthetic.render import render
 from survey.synthetic.shots import ShotOptions
 from survey.synthetic.sprites import shrink
@@ -41,6 +41,14 @@ def town() -> Town:
     return demo_town()
 
 
+def _facing(
+    eye: Floats, aim: Floats, angles_deg: tuple[float, float, float], size_px: tuple[int, int]
+) -> View:
+    """A view from `eye` along `aim`, with pitch, roll and horizontal field of view."""
+    heading = float(np.degrees(np.arctan2(aim[0], aim[1])))
+    return View(float(eye[0]), float(eye[1]), float(eye[2]), heading, *angles_deg, *size_px)
+
+
 def _marked(town: Town, house: House) -> Town:
     """The town with nothing but one house, black, with a white square metre at its left foot."""
     size = (round(house.facade.panel.height_m * 40), round(house.facade.panel.width_m * 40))
@@ -60,8 +68,7 @@ def test_a_corner_of_known_position_is_drawn_where_it_projects(
     panel: Panel = house.facade.panel
     eye = house.facade.middle + 9 * house.facade.outward + 2 * UP
     aim = panel.point(1.0, 1.0) - eye
-    heading = float(np.degrees(np.arctan2(aim[0], aim[1])))
-    view = View(*eye, heading, 3.0, roll_deg, 70.0, 640, 480)
+    view = _facing(eye, aim, (3.0, roll_deg, 70.0), (640, 480))
     picture = render(_marked(town, house), view)
     corners = project(view, np.stack([panel.point(x, y) for x in (0, 1) for y in (0, 1)]))
     rows, cols = np.nonzero(picture[..., 0] > 200)
@@ -75,8 +82,7 @@ def test_the_inner_block_hides_what_stands_behind_it(town: Town) -> None:
     house = next(h for h in town.houses if h.facade.inner and h.facade.street == 0)
     eye = house.facade.middle + 6 * house.facade.outward + 1.6 * UP
     aim = -house.facade.outward
-    heading = float(np.degrees(np.arctan2(aim[0], aim[1])))
-    view = View(*eye, heading, 0.0, 0.0, 40.0, 160, 120)
+    view = _facing(eye, aim, (0.0, 0.0, 40.0), (160, 120))
     alone = Town(town.plan, (house,), town.road, (), town.sprites, town.skies)
     everything = Town(town.plan, town.houses, town.road, (), town.sprites, town.skies)
     assert np.array_equal(render(alone, view)[:90], render(everything, view)[:90])
@@ -130,8 +136,7 @@ def photo(town: Town) -> np.ndarray:
     house = town.houses[4]
     eye = house.facade.middle + 11 * house.facade.outward + 2 * UP
     aim = -house.facade.outward
-    heading = float(np.degrees(np.arctan2(aim[0], aim[1])))
-    return render(town, View(*eye, heading, 8.0, 0.0, 65.0, 320, 240))
+    return render(town, _facing(eye, aim, (8.0, 0.0, 65.0), (320, 240)))
 
 
 @pytest.mark.parametrize("style", STYLES)
