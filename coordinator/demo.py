@@ -23,7 +23,7 @@ from geo.frames import LocalMetres
 from geo.geojson import feature_collection
 from index.opened import OpenedIndex
 from survey import ReadOptions, decode_image
-from survey.synthetic import DemoQuery, DemoSurvey, render_survey
+from survey.synthetic import DemoQuery, DemoSurvey, ShotOptions, render_survey
 
 CONFIG = IndexConfig(codebooks=CodebookConfig(max_words=4000))
 SHARD_SIZE = 8
@@ -67,10 +67,15 @@ class DemoReport:
     geojson: Path
 
 
-def run_demo(out: Path, engine: Engine, progress: Progress) -> DemoReport:
-    """Render, index, locate, compare with the truth, and write the results."""
+def run_demo(
+    out: Path, engine: Engine, progress: Progress, shots: ShotOptions | None = None
+) -> DemoReport:
+    """Render, index, locate, compare with the truth, and write the results.
+
+    shots : how many pictures and how large; None: the whole town.
+    """
     progress.begin("render", 1, 0)
-    demo = render_survey(out)
+    demo = render_survey(out, options=shots)
     progress.advance("render")
     intake = read_surveys([("", demo.survey)], ReadOptions(crs=demo.crs))
     root = (out / "index").absolute()
