@@ -1,6 +1,6 @@
 """How the shipped choice of detectors and k is made: `python -m benchmarks default-model`.
 
-Towns of other seeds than the demo's are rendered, indexed with default settings, and every query
+Towns of other seeds than the demo's are rendered, indexed as the demo indexes, and every query
 is searched with every pair and k; Eq. 1 is fitted on all of them, one place left out at a time
 for the scores. Only coefficients are kept. Takes a quarter of an hour.
 """
@@ -9,11 +9,12 @@ import tempfile
 from contextlib import nullcontext
 from pathlib import Path
 
-from contracts.config import DESCRIPTORS, DETECTORS, IndexConfig, SearchConfig
+from contracts.config import DESCRIPTORS, DETECTORS, SearchConfig
 from coordinator.cli.show import bars
+from coordinator.demo import CONFIG, SHARD_SIZE
 from coordinator.engine import running_engine
 from coordinator.indexing import run_job
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
+from coordinator.plan import make_plan, read_surveys
 from coordinator.querying import rehearse_queries
 from coordinator.training import places_of, training_rows
 from coordinator.truth import read_truth
@@ -37,7 +38,7 @@ def run(_: Path) -> None:
             demo = render_survey(Path(scratch) / str(seed), seed=seed)
             intake = read_surveys([("", demo.survey)], ReadOptions(crs=demo.crs))
             root = Path(scratch) / f"index-{seed}"
-            job, plan = make_plan(root, intake, IndexConfig(), DEFAULT_SHARD_SIZE // 4)
+            job, plan = make_plan(root, intake, CONFIG, SHARD_SIZE)
             with bars() as progress:
                 run_job(job, plan, intake, nullcontext(engine), progress)
             index = OpenedIndex(root)

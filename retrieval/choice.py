@@ -2,14 +2,22 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, ValidationError
 
 from contracts.config import Descriptor, Detector, Vote, Weight
 from contracts.errors import BadIndex, WrongInput
 from retrieval.complementarity import Complementarity
-from retrieval.regression import Choice, Fitted, Pair, Record, TrainingRow, fit_equations
+from retrieval.regression import (
+    Choice,
+    Fitted,
+    Pair,
+    Record,
+    TrainingRow,
+    Variant,
+    fit_equations,
+)
 
 __all__ = ["Choice", "ChoiceModel", "LeftOutScores", "Pair", "TrainingRow", "TrainingSet", "fit"]
 
@@ -39,6 +47,7 @@ class ChoiceModel(Record):
     """A fitted choice, the search it was trained for, and what it proved to be worth."""
 
     form: Literal[1] = 1
+    variant: Variant
     detectors: tuple[Detector, ...]
     descriptors: tuple[Descriptor, ...]
     vote: Vote
@@ -93,7 +102,7 @@ class ChoiceModel(Record):
         scores = self.left_out
         n_queries = sum(one.n_queries for one in self.trained_on)
         return (
-            f"{n_queries} queries, each with its place left out: adaptive mAP "
+            f"{n_queries} queries, each with its place left out: adaptive ({self.variant}) mAP "
             f"{scores.adaptive:.3f}, best fixed {scores.best_fixed:.3f}, random "
             f"{scores.random:.3f}, oracle {scores.oracle:.3f}; fallback "
             f"{'-'.join(self.fallback_pair)} with k = {self.fallback_k}"
@@ -111,6 +120,8 @@ def fit(
 ) -> ChoiceModel:
     """Fit Eq. 1 per k by least squares, and score it with each place left out in turn.
 
+    Its two variants are both scored; the one that does better on places left out is kept.
+
     Parameters
     ----------
     rows : one per query, pair and k.
@@ -123,13 +134,16 @@ def fit(
         have, or has one twice, or lies in two places.
     """
     queries = _by_query(rows)
+    scores = {variant: _left_out(rows, queries, variant) for variant in get_args(Variant)}
+    variant: Variant = max(scores, key=lambda name: scores[name].adaptive)
     return ChoiceModel(
+        variant=variant,
         detectors=detectors,
         descriptors=descriptors,
         vote=vote,
         weights=weights,
-        fitted=fit_equations(rows),
-        left_out=_left_out(rows, queries),
+        fitted=fit_equations(rows, variant),
+        left_out=scores[variant],
         trained_on=trained_on,
     )
 
@@ -157,11 +171,13 @@ def _by_query(rows: Sequence[TrainingRow]) -> dict[str, list[TrainingRow]]:
 
 
 def _left_out(
-    rows: Sequence[TrainingRow], queries: Mapping[str, Sequence[TrainingRow]]
+    rows: Sequence[TrainingRow],
+    queries: Mapping[str, Sequence[TrainingRow]],
+    variant: Variant,
 ) -> LeftOutScores:
     adaptive, best_fixed = [], []
     for place in sorted({row.place for row in rows}):
-        fitted = fit_equations([row for row in rows if row.place != place])
+        fitted = fit_equations([row for row in rows if row.place != place], variant)
         ks = [equation.k for equation in fitted.equations]
         for own in queries.values():
             if own[0].place != place:

@@ -1,13 +1,14 @@
 """Eq. 1 of Bhowmik et al., JURSE 2017: how well a pair of detectors should do on a photo.
 
 mAP' = b1 Kp + b2 CSDi + b3 CSCo + b4 CSCl, one equation per k, no intercept. METHOD section 4
-says what is reconstructed: one row per (query, pair), fitted to that query's AP.
+says what is reconstructed: one row per (query, pair), fitted to that query's AP. The variant
+`pair_offsets` adds a constant of the pair: Eq. 1 alone cannot say that a detector is good.
 """
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -19,6 +20,7 @@ from retrieval.complementarity import Complementarity
 Pair = tuple[Detector, Detector]
 K = Annotated[int, Field(ge=1, le=MAX_NEIGHBOURS)]
 Four = tuple[float, float, float, float]
+Variant = Literal["eq1", "pair_offsets"]
 
 FEATURES = ("Kp", "CSDi", "CSCo", "CSCl")
 
@@ -51,11 +53,24 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+class Offset(Record):
+    """What a pair is worth whatever the photo."""
+
+    pair: Pair
+    value: float
+
+
 class Equation(Record):
-    """Eq. 1 for one k. coefficients : of Kp, CSDi, CSCo, CSCl."""
+    """Eq. 1 for one k. coefficients : of Kp, CSDi, CSCo, CSCl. offsets : none in Eq. 1 itself."""
 
     k: K
     coefficients: Four
+    offsets: tuple[Offset, ...] = ()
+
+    def value(self, pair: Pair, features: Complementarity) -> float:
+        """Evaluate it for a pair of a photo; a pair without an offset has 0."""
+        offset = sum(each.value for each in self.offsets if set(each.pair) == set(pair))
+        return offset + float(np.dot(self.coefficients, features.as_tuple()))
 
 
 class FixedScore(Record):
@@ -77,7 +92,7 @@ class Fitted(Record):
     highest: Four
     fixed: Annotated[tuple[FixedScore, ...], Field(min_length=1)]
 
-    def predict(self, features: Complementarity, k: int) -> float:
+    def predict(self, pair: Pair, features: Complementarity, k: int) -> float:
         """Evaluate Eq. 1.
 
         Raises
@@ -86,7 +101,7 @@ class Fitted(Record):
         """
         for equation in self.equations:
             if equation.k == k:
-                return float(np.dot(equation.coefficients, features.as_tuple()))
+                return equation.value(pair, features)
         known = ", ".join(str(equation.k) for equation in self.equations)
         raise WrongInput(
             f"the adaptive model knows k = {known}, not {k}; choose one of them, or give both "
@@ -111,7 +126,9 @@ class Fitted(Record):
         if not features or not ks:
             raise WrongInput("the adaptive choice needs at least one pair and one k to choose from")
         candidates = [
-            (self.predict(of_pair, k), pair, k) for pair, of_pair in features.items() for k in ks
+            (self.predict(pair, of_pair, k), pair, k)
+            for pair, of_pair in features.items()
+            for k in ks
         ]
         predicted, pair, k = max(candidates, key=lambda candidate: candidate[0])
         outside = self._outside(features[pair])
@@ -147,24 +164,32 @@ class Fitted(Record):
         )
 
 
-def fit_equations(rows: Sequence[TrainingRow]) -> Fitted:
+def fit_equations(rows: Sequence[TrainingRow], variant: Variant = "eq1") -> Fitted:
     """Fit Eq. 1 per k by least squares; rank the fixed choices. At least one row."""
     by_k: dict[int, list[TrainingRow]] = defaultdict(list)
     for row in rows:
         by_k[row.k].append(row)
     features = np.array([row.features.as_tuple() for row in rows])
     return Fitted(
-        equations=tuple(Equation(k=k, coefficients=_solved(by_k[k])) for k in sorted(by_k)),
+        equations=tuple(_solved(by_k[k], k, variant) for k in sorted(by_k)),
         lowest=_four(features.min(axis=0).tolist()),
         highest=_four(features.max(axis=0).tolist()),
         fixed=_fixed_scores(rows),
     )
 
 
-def _solved(rows: Sequence[TrainingRow]) -> Four:
+def _solved(rows: Sequence[TrainingRow], k: int, variant: Variant) -> Equation:
+    pairs = sorted({row.pair for row in rows}) if variant == "pair_offsets" else []
     features = np.array([row.features.as_tuple() for row in rows])
-    solution = np.linalg.lstsq(features, np.array([row.ap for row in rows]), rcond=None)[0]
-    return _four(solution.tolist())
+    is_pair = np.array([[row.pair == pair for pair in pairs] for row in rows], dtype=np.float64)
+    known = np.hstack([features, is_pair.reshape(len(rows), len(pairs))])
+    solution = np.linalg.lstsq(known, np.array([row.ap for row in rows]), rcond=None)[0].tolist()
+    offsets = zip(pairs, solution[4:], strict=True)
+    return Equation(
+        k=k,
+        coefficients=_four(solution[:4]),
+        offsets=tuple(Offset(pair=pair, value=value) for pair, value in offsets),
+    )
 
 
 def _four(values: Sequence[float]) -> Four:

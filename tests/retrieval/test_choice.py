@@ -1,6 +1,7 @@
 """The adaptive choice follows Eq. 1 within its training, and falls back outside it."""
 
 import json
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -165,3 +166,22 @@ def test_training_needs_every_query_with_everything_and_two_places() -> None:
         fitted([row for row in training if row.place == "p0"])
     with pytest.raises(WrongInput, match="got 0"):
         fitted([])
+
+
+def test_a_pair_that_is_better_whatever_the_photo_gets_an_offset() -> None:
+    better = PAIRS[2]
+    lifted = [replace(row, ap=row.ap + 0.3 * (row.pair == better)) for row in rows(0.02)]
+    model = fitted(lifted)
+    assert model.variant == "pair_offsets"
+    for equation in model.fitted.equations:
+        offsets = {each.pair: each.value for each in equation.offsets}
+        others = [offsets[pair] for pair in PAIRS if pair != better]
+        assert offsets[better] == pytest.approx(np.mean(others) + 0.3, abs=0.05)
+    same = {pair: middle(0.5) for pair in PAIRS}
+    assert model.choose(same, (2, 5)).pair == better
+    assert ChoiceModel.from_json(model.to_json()) == model
+
+
+def test_scores_that_obey_eq_1_keep_it_as_published(model: ChoiceModel) -> None:
+    assert model.variant == "eq1"
+    assert all(not equation.offsets for equation in model.fitted.equations)
