@@ -2,17 +2,25 @@
 
 Towns of other seeds than the demo's are rendered, indexed as the demo indexes, and every query
 is searched with every pair and k; Eq. 1 is fitted on all of them, one place left out at a time
-for the scores. Only coefficients are kept. Takes a quarter of an hour.
+for the scores. Only coefficients are kept. Takes half an hour.
 """
 
 import tempfile
 from contextlib import nullcontext
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
-from contracts.config import DESCRIPTORS, DETECTORS, SearchConfig
+from contracts.config import (
+    DESCRIPTORS,
+    DETECTORS,
+    FeatureConfig,
+    IndexConfig,
+    SearchConfig,
+)
 from coordinator.cli.show import bars
 from coordinator.demo import CONFIG, SHARD_SIZE
-from coordinator.engine import running_engine
+from coordinator.engine import Engine, running_engine
 from coordinator.indexing import run_job
 from coordinator.plan import make_plan, read_surveys
 from coordinator.querying import rehearse_queries
@@ -21,10 +29,12 @@ from coordinator.truth import read_truth
 from index.opened import OpenedIndex
 from retrieval.choice import TrainingRow, TrainingSet, fit
 from survey import ReadOptions
-from survey.synthetic import render_survey
+from survey.synthetic import DemoSurvey, render_survey
 from workers.stages.retrieve import KS
 
 SEEDS = (1, 2, 3)
+MAX_FRAMES = (600, 1000)
+"""The demo's, and the default of `flaneur index`."""
 SHIPPED = Path(__file__).parents[1] / "index" / "default_choice.json"
 
 
@@ -34,21 +44,15 @@ def run(_: Path) -> None:
     rows: list[TrainingRow] = []
     sets: list[TrainingSet] = []
     with tempfile.TemporaryDirectory() as scratch, running_engine(None, None) as engine:
-        for seed in SEEDS:
+        for seed, max_frames in product(SEEDS, MAX_FRAMES):
+            name = f"synthetic town, seed {seed}, {max_frames} frames"
             demo = render_survey(Path(scratch) / str(seed), seed=seed)
-            intake = read_surveys([("", demo.survey)], ReadOptions(crs=demo.crs))
-            root = Path(scratch) / f"index-{seed}"
-            job, plan = make_plan(root, intake, CONFIG, SHARD_SIZE)
-            with bars() as progress:
-                run_job(job, plan, intake, nullcontext(engine), progress)
-            index = OpenedIndex(root)
-            truth = demo.queries / "ground_truth.json"
-            queries = read_truth(truth, None, index.catalogue.column("uri"))
-            answers = rehearse_queries(index, queries, search, KS, engine.follower, lambda: None)
-            name = f"synthetic town, seed {seed}"
-            places = {query: f"{name}: {place}" for query, place in places_of(queries).items()}
-            found = training_rows(answers, places)
-            rows += [_named(row, name) for row in found]
+            found = rehearsed(demo, Path(scratch) / name, max_frames, engine)
+            # The same place, however many frames are found there, is left out as one.
+            rows += [
+                replace(row, query=f"{name}: {row.query}", place=f"seed {seed}: {row.place}")
+                for row in found
+            ]
             sets.append(
                 TrainingSet(
                     set=name,
@@ -70,5 +74,15 @@ def run(_: Path) -> None:
         print(f"{'-'.join(fixed.pair)}, k = {fixed.k}: mAP {fixed.mean_ap:.3f}")
 
 
-def _named(row: TrainingRow, name: str) -> TrainingRow:
-    return TrainingRow(f"{name}: {row.query}", row.place, row.pair, row.k, row.features, row.ap)
+def rehearsed(demo: DemoSurvey, root: Path, max_frames: int, engine: Engine) -> list[TrainingRow]:
+    """Index a town as the demo does and search every query with every pair and k."""
+    config = IndexConfig(features=FeatureConfig(max_frames=max_frames), codebooks=CONFIG.codebooks)
+    intake = read_surveys([("", demo.survey)], ReadOptions(crs=demo.crs))
+    job, plan = make_plan(root, intake, config, SHARD_SIZE)
+    with bars() as progress:
+        run_job(job, plan, intake, nullcontext(engine), progress)
+    index = OpenedIndex(root)
+    truth = demo.queries / "ground_truth.json"
+    queries = read_truth(truth, None, index.catalogue.column("uri"))
+    answers = rehearse_queries(index, queries, SearchConfig(), KS, engine.follower, lambda: None)
+    return training_rows(answers, places_of(queries))

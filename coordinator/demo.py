@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from contracts.config import CodebookConfig, IndexConfig, SearchConfig
+from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.engine import Engine
 from coordinator.export.files import write_geojson
 from coordinator.export.page import write_page
@@ -25,7 +25,9 @@ from index.opened import OpenedIndex
 from survey import ReadOptions, decode_image
 from survey.synthetic import DemoQuery, DemoSurvey, ShotOptions, render_survey
 
-CONFIG = IndexConfig(codebooks=CodebookConfig(max_words=4000))
+CONFIG = IndexConfig(
+    features=FeatureConfig(max_frames=600), codebooks=CodebookConfig(max_words=4000)
+)
 SHARD_SIZE = 8
 RIGHT_WITHIN_M = 25.0
 THUMBNAIL_PX = 240
