@@ -79,6 +79,11 @@ class ChoiceModel(Record):
             ) from error
 
     @property
+    def is_worth_using(self) -> bool:
+        """Whether choosing did better than one fixed pair on places left out."""
+        return self.left_out.adaptive > self.left_out.best_fixed
+
+    @property
     def ks(self) -> tuple[int, ...]:
         """Every k that can be chosen, ascending."""
         return tuple(equation.k for equation in self.fitted.equations)

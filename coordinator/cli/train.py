@@ -66,4 +66,6 @@ def command(
     for answer in unreadable:
         complain(f"{answer['query']}: {answer['error']}")
     tell(model.summary())
+    if not model.is_worth_using:
+        complain("It does no better than one pair for all: `flaneur locate` will not use it.")
     return SOME_SKIPPED if unreadable else 0

@@ -185,3 +185,11 @@ def test_a_pair_that_is_better_whatever_the_photo_gets_an_offset() -> None:
 def test_scores_that_obey_eq_1_keep_it_as_published(model: ChoiceModel) -> None:
     assert model.variant == "eq1"
     assert all(not equation.offsets for equation in model.fitted.equations)
+
+
+def test_a_model_that_proved_nothing_on_places_left_out_is_not_worth_using(
+    model: ChoiceModel,
+) -> None:
+    assert model.is_worth_using
+    scores = model.left_out.model_copy(update={"adaptive": model.left_out.best_fixed})
+    assert not model.model_copy(update={"left_out": scores}).is_worth_using

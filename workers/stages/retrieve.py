@@ -21,8 +21,8 @@ from retrieval.fusion import ChannelQuery, Scores, fuse
 from retrieval.pyramid import Pyramid, build_pyramid
 from survey import DecodedImage, decode_image
 
-DEFAULT_PAIR: tuple[Detector, Detector] = ("hesaff", "star")
-"""The pair where no model can choose: the paper's best one across domains."""
+DEFAULT_PAIR: tuple[Detector, Detector] = ("hesaff", "mser")
+"""The pair where no model chooses (docs/decisions/0006)."""
 DEFAULT_K = 2
 KS = (2, 5, 10)
 """What `--k auto` chooses from, as in the paper's Table IV."""
@@ -106,7 +106,7 @@ def default_pair(index: OpenedIndex) -> tuple[Detector, ...]:
 
 
 def usable_model(index: OpenedIndex, search: SearchConfig) -> tuple[ChoiceModel | None, str]:
-    """The index's own model, or the shipped one, if it was trained for this kind of search."""
+    """The index's own model, or the shipped one, if it fits this search and is worth it."""
     model = read_model(index.root)
     if model is None:
         return None, "no model"
@@ -117,6 +117,12 @@ def usable_model(index: OpenedIndex, search: SearchConfig) -> tuple[ChoiceModel 
     asked = (descriptors_of(index, search), search.vote, tuple(sorted(search.weights)))
     if trained != asked:
         return None, "the model was trained with other descriptors, vote or weights"
+    if not model.is_worth_using:
+        scores = model.left_out
+        return None, (
+            f"on places left out the model ({scores.adaptive:.3f}) is no better than one pair "
+            f"for all ({scores.best_fixed:.3f})"
+        )
     return model, ""
 
 
