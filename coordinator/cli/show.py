@@ -10,6 +10,7 @@ from rich.progress import (
     MofNCompleteColumn,
     Progress,
     SpinnerColumn,
+    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -44,7 +45,7 @@ class Bars:
 
     def __init__(self, progress: Progress | None) -> None:
         self._progress = progress
-        self._bars: dict[str, int] = {}
+        self._bars: dict[str, TaskID] = {}
         self._left: dict[str, int] = {}
 
     def begin(self, stage: str, total: int, done: int) -> None:
@@ -57,7 +58,7 @@ class Bars:
     def advance(self, stage: str) -> None:
         self._left[stage] -= 1
         if self._progress is not None:
-            self._progress.advance(self._bars[stage])  # type: ignore[arg-type]
+            self._progress.advance(self._bars[stage])
         elif self._left[stage] == 0:
             tell(f"{stage}: done")
 
