@@ -7,11 +7,14 @@ from typing import Annotated
 import typer
 
 from coordinator.cli.lists import (
+    SOME_SKIPPED,
     Broker,
     Descriptors,
     IndexFolder,
     K,
     Pair,
+    Truth,
+    TruthRoot,
     Vote,
     Weights,
     Workers,
@@ -22,15 +25,12 @@ from coordinator.cli.outputs import result_folder
 from coordinator.cli.show import bars, complain
 
 NAME = "evaluate"
-SOME_SKIPPED = 3
 
 
 def command(
     index: IndexFolder,
-    truth: Annotated[Path, typer.Option(help="JSON: query path -> relevant references.")],
-    root: Annotated[
-        Path | None, typer.Option(help="Folder of the queries; default: the truth file's.")
-    ] = None,
+    truth: Truth,
+    root: TruthRoot = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the report.")] = None,
     pair: Pair = "auto",
     k: K = "auto",

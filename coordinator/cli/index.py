@@ -17,11 +17,10 @@ from contracts.config import (
     North,
 )
 from contracts.errors import BadConfig
-from coordinator.cli.lists import Broker, Workers, names_among
+from coordinator.cli.lists import SOME_SKIPPED, Broker, Workers, names_among
 from coordinator.cli.show import bars, complain, list_skipped, tell
 
 NAME = "index"
-SOME_SKIPPED = 3
 
 
 def command(

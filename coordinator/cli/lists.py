@@ -1,4 +1,4 @@
-"""Options that take lists or alternatives, shared by the verbs."""
+"""Options and the exit code that the verbs share."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +17,9 @@ from contracts.config import (
 from contracts.config import Vote as VoteName
 from contracts.errors import BadConfig
 
+SOME_SKIPPED = 3
+"""Exit code: done, but some images were skipped."""
+
 Broker = Annotated[
     str | None,
     typer.Option(
@@ -29,6 +32,10 @@ Workers = Annotated[
     int | None, typer.Option(min=1, help="Local worker processes; default: one a core.")
 ]
 IndexFolder = Annotated[Path, typer.Option("--index", help="The index to search.")]
+Truth = Annotated[Path, typer.Option(help="JSON: query path -> relevant references.")]
+TruthRoot = Annotated[
+    Path | None, typer.Option(help="Folder of the queries; default: the truth file's.")
+]
 Pair = Annotated[
     str, typer.Option(help="auto, two detectors such as hesaff,star, or one.", show_default=True)
 ]

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from coordinator.cli.lists import (
+    SOME_SKIPPED,
     Broker,
     Descriptors,
     IndexFolder,
@@ -21,7 +22,6 @@ from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
 
 NAME = "locate"
-SOME_SKIPPED = 3
 
 
 def command(

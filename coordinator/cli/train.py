@@ -6,9 +6,12 @@ from typing import Annotated
 import typer
 
 from coordinator.cli.lists import (
+    SOME_SKIPPED,
     Broker,
     Descriptors,
     IndexFolder,
+    Truth,
+    TruthRoot,
     Vote,
     Weights,
     Workers,
@@ -19,15 +22,12 @@ from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
 
 NAME = "train"
-SOME_SKIPPED = 3
 
 
 def command(
     index: IndexFolder,
-    truth: Annotated[Path, typer.Option(help="JSON: query path -> relevant references.")],
-    root: Annotated[
-        Path | None, typer.Option(help="Folder of the queries; default: the truth file's.")
-    ] = None,
+    truth: Truth,
+    root: TruthRoot = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the model here, not into the index.")
     ] = None,
