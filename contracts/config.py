@@ -9,13 +9,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from contracts.errors import BadConfig
 
-Detector = Literal["hesaff", "mser", "star", "har", "orb"]
+Detector = Literal["hesaff", "mser", "star", "har", "orb", "colsym"]
 Descriptor = Literal["sift", "surf", "sc"]
 Vote = Literal["union", "intersection", "pairwise"]
 Weight = Literal["idf", "norm", "burst"]
 North = Literal["grid", "true", "magnetic"]
 
-DETECTORS: tuple[Detector, ...] = ("hesaff", "mser", "star", "har", "orb")
+DETECTORS: tuple[Detector, ...] = ("hesaff", "mser", "star", "har", "orb", "colsym")
 DESCRIPTORS: tuple[Descriptor, ...] = ("sift", "surf", "sc")
 DESCRIPTOR_SIZES: dict[Descriptor, int] = {"sift": 128, "surf": 64, "sc": 36}
 MAX_NEIGHBOURS = 10

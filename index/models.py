@@ -15,19 +15,22 @@ def model_path(root: Path) -> Path:
     return root / "models" / "choice.json"
 
 
-def read_model(root: Path) -> ChoiceModel | None:
-    """The index's own model, else the shipped one, else None.
+def read_model(root: Path | None) -> ChoiceModel | None:
+    """The index's own model, else (and without an index) the shipped one, else None.
 
     Raises
     ------
     BadIndex : there is a model and it does not hold.
     """
-    path = model_path(root)
-    try:
-        if path.is_file():
-            return ChoiceModel.from_json(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadIndex(f"{path} cannot be read ({error}). Run `flaneur train` again.") from error
+    if root is not None:
+        path = model_path(root)
+        try:
+            if path.is_file():
+                return ChoiceModel.from_json(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise BadIndex(
+                f"{path} cannot be read ({error}). Run `flaneur train` again."
+            ) from error
     shipped = resources.files("index") / _SHIPPED
     return ChoiceModel.from_json(shipped.read_text(encoding="utf-8")) if shipped.is_file() else None
 

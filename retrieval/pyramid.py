@@ -11,8 +11,9 @@ LEVELS_PER_OCTAVE = 3
 BASE_SIGMA = 1.6
 """Blur of the first level that detectors search (Lowe 2004), pixels of its own octave."""
 
-_CAMERA_SIGMA = 0.5
-_FINE_SIGMAS = (_CAMERA_SIGMA, 0.8, 1.0, 1.27)
+CAMERA_SIGMA = 0.5
+"""Blur of a sharp photo, pixels (Lowe 2004)."""
+_FINE_SIGMAS = (CAMERA_SIGMA, 0.8, 1.0, 1.27)
 _MIN_SIDE = 16
 _MAX_GAIN = 4.0
 
@@ -34,11 +35,14 @@ class Level:
 class Pyramid:
     """The scale space of one photo, contrast stretched.
 
+    rgb : (h, w, 3) uint8, the photo as given. gain : by how much the stretch multiplied contrast.
     grey : (h, w) float32, usually within 0 to 255. grey8 : the same, clipped to uint8.
     fine : full-size levels below BASE_SIGMA, for sampling only.
     octaves : each LEVELS_PER_OCTAVE + 2 levels, finest first; empty for a tiny photo.
     """
 
+    rgb: NDArray[np.uint8]
+    gain: float
     grey: NDArray[np.float32]
     grey8: NDArray[np.uint8]
     fine: tuple[Level, ...]
@@ -70,19 +74,20 @@ def build_pyramid(rgb: NDArray[np.uint8]) -> Pyramid:
             f"image: found shape {rgb.shape} and dtype {rgb.dtype}, expected (h, w, 3) uint8 with "
             "at least one pixel; decode it to RGB first"
         )
-    grey = _stretch(np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), np.uint8))
+    grey, gain = _stretch(np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), np.uint8))
     grey8 = np.clip(np.rint(grey), 0, 255).astype(np.uint8)
     levels = _blur_up(grey, _FINE_SIGMAS)
     fine = tuple(Level(p, s, 1) for p, s in zip(levels, _FINE_SIGMAS, strict=True))
-    return Pyramid(grey, grey8, fine, _build_octaves(fine[-1]))
+    return Pyramid(rgb, gain, grey, grey8, fine, _build_octaves(fine[-1]))
 
 
-def _stretch(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Map the 1st to 99th percentile onto the full range."""
+def _stretch(grey: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
+    """Map the 1st to 99th percentile onto the full range; also return the gain."""
     cumulative = np.cumsum(np.bincount(grey.ravel(), minlength=256)) / grey.size
     low, high = np.searchsorted(cumulative, (0.01, 0.99))
     gain = min(255.0 / max(int(high) - int(low), 1), _MAX_GAIN)
-    return ((grey.astype(np.float32) - np.float32(low)) * np.float32(gain)).astype(np.float32)
+    stretched = (grey.astype(np.float32) - np.float32(low)) * np.float32(gain)
+    return stretched.astype(np.float32), gain
 
 
 def _build_octaves(finest: Level) -> tuple[tuple[Level, ...], ...]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from contracts.config import Detector
 from contracts.records import Frames
+from retrieval.detectors.colsym import detect_colsym
 from retrieval.detectors.har import detect_har
 from retrieval.detectors.hesaff import detect_hesaff
 from retrieval.detectors.mser import detect_mser
@@ -23,6 +24,7 @@ _DETECTORS: Mapping[Detector, _Detect] = MappingProxyType(
         "star": detect_star,
         "har": detect_har,
         "orb": detect_orb,
+        "colsym": detect_colsym,
     }
 )
 

@@ -24,7 +24,7 @@ class _Index:
 
 @pytest.fixture
 def photo(tmp_path: Path, small_survey: Path) -> Photo:
-    return read_photo(_Index(), str(small_survey / "00.jpg"))  # type: ignore[arg-type]
+    return read_photo(_Index(), str(small_survey / "00.jpg"))
 
 
 def a_model(photo: Photo, *, worth_using: bool) -> ChoiceModel:
@@ -63,7 +63,7 @@ def chosen_with(
     monkeypatch: pytest.MonkeyPatch,
 ) -> retrieve.Chosen:
     monkeypatch.setattr(retrieve, "read_model", lambda _: model)
-    return choose(_Index(), photo, search)  # type: ignore[arg-type]
+    return choose(_Index(), photo, search)
 
 
 def test_a_model_worth_using_chooses_and_predicts(
@@ -95,6 +95,17 @@ def test_otherwise_the_default_pair_is_used_and_says_why(
     assert (chosen.detectors, chosen.k) == (("hesaff", "mser"), 2)
     assert chosen.choice.startswith("default: ")
     assert says in chosen.choice
+
+
+def test_a_model_does_not_judge_detectors_that_it_was_trained_without(
+    photo: Photo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = a_model(photo, worth_using=True)
+    knows = model.model_copy(update={"detectors": ("hesaff", "mser")})
+    chosen = chosen_with(knows, photo, SearchConfig(), monkeypatch)
+    assert set(chosen.detectors) == {"hesaff", "mser"}
+    given = chosen_with(knows, photo, SearchConfig(pair=("mser", "star")), monkeypatch)
+    assert given.choice == "default: the model was trained without star"
 
 
 def test_without_a_model_the_default_pair_is_used_and_says_so(

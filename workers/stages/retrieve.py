@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contracts.config import Descriptor, Detector, SearchConfig
+from contracts.config import Descriptor, Detector, IndexConfig, SearchConfig
 from contracts.errors import BadConfig
 from contracts.records import Frames
 from index.models import read_model
@@ -26,6 +27,19 @@ DEFAULT_PAIR: tuple[Detector, Detector] = ("hesaff", "mser")
 DEFAULT_K = 2
 KS = (2, 5, 10)
 """What `--k auto` chooses from, as in the paper's Table IV."""
+
+
+class Configured(Protocol):
+    """As much of an index as a photo is read and a choice is made with.
+
+    root : where the index's own model may be; None: there is no index yet.
+    config : how its images became features.
+    """
+
+    @property
+    def root(self) -> Path | None: ...
+    @property
+    def config(self) -> IndexConfig: ...
 
 
 @lru_cache(maxsize=2)
@@ -56,7 +70,7 @@ class Photo:
         return all_pairs({name: self.frames[name] for name in detectors}, width, height)
 
 
-def read_photo(index: OpenedIndex, path: str) -> Photo:
+def read_photo(index: Configured, path: str) -> Photo:
     """Decode a photo as the index's images were, and find its frames.
 
     Raises
@@ -80,7 +94,7 @@ class Chosen:
     choice: str
 
 
-def choose(index: OpenedIndex, photo: Photo, search: SearchConfig) -> Chosen:
+def choose(index: Configured, photo: Photo, search: SearchConfig) -> Chosen:
     """Settle the detectors and k: as given, by the model, or the default that says so."""
     if search.pair != "auto" and search.k != "auto":
         return Chosen(search.pair, search.k, None, "given")
@@ -91,7 +105,7 @@ def choose(index: OpenedIndex, photo: Photo, search: SearchConfig) -> Chosen:
         pair = search.pair if search.pair != "auto" else default_pair(index)
         k = search.k if search.k != "auto" else DEFAULT_K
         return Chosen(pair, k, None, f"default: {why_not}")
-    features = photo.complementarity(index.config.features.detectors)
+    features = photo.complementarity(model.detectors)
     if search.pair != "auto":
         wanted = set(search.pair)
         features = {pair: scores for pair, scores in features.items() if set(pair) == wanted}
@@ -99,13 +113,13 @@ def choose(index: OpenedIndex, photo: Photo, search: SearchConfig) -> Chosen:
     return Chosen(made.pair, made.k, made.predicted_map, made.reason)
 
 
-def default_pair(index: OpenedIndex) -> tuple[Detector, ...]:
+def default_pair(index: Configured) -> tuple[Detector, ...]:
     """The default pair, or the first detectors of an index that lacks one of it."""
     detectors = index.config.features.detectors
     return DEFAULT_PAIR if set(DEFAULT_PAIR) <= set(detectors) else detectors[:2]
 
 
-def usable_model(index: OpenedIndex, search: SearchConfig) -> tuple[ChoiceModel | None, str]:
+def usable_model(index: Configured, search: SearchConfig) -> tuple[ChoiceModel | None, str]:
     """The index's own model, or the shipped one, if it fits this search and is worth it."""
     model = read_model(index.root)
     if model is None:
@@ -113,6 +127,9 @@ def usable_model(index: OpenedIndex, search: SearchConfig) -> tuple[ChoiceModel 
     missing = set(model.detectors) - set(index.config.features.detectors)
     if missing:
         return None, f"the model also wants {', '.join(sorted(missing))}"
+    untrained = set(() if search.pair == "auto" else search.pair) - set(model.detectors)
+    if untrained:
+        return None, f"the model was trained without {', '.join(sorted(untrained))}"
     trained = (model.descriptors, model.vote, model.weights)
     asked = (descriptors_of(index, search), search.vote, tuple(sorted(search.weights)))
     if trained != asked:
@@ -126,7 +143,7 @@ def usable_model(index: OpenedIndex, search: SearchConfig) -> tuple[ChoiceModel 
     return model, ""
 
 
-def descriptors_of(index: OpenedIndex, search: SearchConfig) -> tuple[Descriptor, ...]:
+def descriptors_of(index: Configured, search: SearchConfig) -> tuple[Descriptor, ...]:
     """The descriptors a search uses: those asked for, or all of the index."""
     return search.descriptors or index.config.features.descriptors
 
