@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from contracts.config import Descriptor
+from contracts.config import DESCRIPTOR_SIZES, Descriptor
 from contracts.records import Frames
 from retrieval.descriptors.shape_context import describe_shape_context
 from retrieval.descriptors.sift import describe_sift
@@ -27,14 +27,16 @@ def describe(
     Descriptor name -> (n, 128) for sift, (n, 64) for surf, (n, 36) for sc; uint8, in the order
     of the frames.
     """
-    patches = cut_patches(pyramid, frames)
-    described: dict[Descriptor, NDArray[np.uint8]] = {}
-    if "surf" in descriptors:
-        described["surf"] = describe_surf(patches)
-    if "sift" in descriptors or "sc" in descriptors:
-        magnitude, angle = patch_gradients(patches)
-        if "sift" in descriptors:
-            described["sift"] = describe_sift(magnitude, angle)
-        if "sc" in descriptors:
-            described["sc"] = describe_shape_context(magnitude, angle)
-    return {name: described[name] for name in descriptors}
+    described = {
+        name: np.empty((len(frames), DESCRIPTOR_SIZES[name]), np.uint8) for name in descriptors
+    }
+    for rows, patches in cut_patches(pyramid, frames):
+        if "surf" in described:
+            described["surf"][rows] = describe_surf(patches)
+        if "sift" in described or "sc" in described:
+            magnitude, angle = patch_gradients(patches)
+            if "sift" in described:
+                described["sift"][rows] = describe_sift(magnitude, angle)
+            if "sc" in described:
+                described["sc"][rows] = describe_shape_context(magnitude, angle)
+    return described

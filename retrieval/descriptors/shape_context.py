@@ -42,16 +42,15 @@ def describe_shape_context(
     n = len(magnitude)
     out = np.zeros((n, _LOCATIONS * _ORIENTATIONS), np.uint8)
     ring, sector = _locations()
-    edges = np.empty((PATCH_SIDE, PATCH_SIDE), np.uint8)
-    stack = np.empty((PATCH_SIDE * PATCH_SIDE, 2), np.int64)
+    edges = np.zeros((PATCH_SIDE, PATCH_SIDE), np.uint8)
+    found = np.empty(PATCH_SIDE * PATCH_SIDE, np.int32)
     histogram = np.empty((_LOCATIONS, _ORIENTATIONS), np.float64)
     for i in range(n):
-        find_edges(magnitude[i], angle[i], edges, stack)
+        n_found = find_edges(magnitude[i], angle[i], edges, found)
         histogram[:] = 0.0
-        for row in range(2, PATCH_SIDE - 2):
-            for column in range(2, PATCH_SIDE - 2):
-                if edges[row, column] != 2 or ring[row, column] < 0:
-                    continue
+        for at in found[:n_found]:
+            row, column = at // PATCH_SIDE, at % PATCH_SIDE
+            if ring[row, column] >= 0:
                 _vote(
                     histogram,
                     float(magnitude[i, row, column]),
@@ -85,58 +84,85 @@ def find_edges(
     magnitude: NDArray[np.float32],
     angle: NDArray[np.float32],
     edges: NDArray[np.uint8],
-    stack: NDArray[np.int64],
-) -> None:
-    """Canny's edges of one patch: 2 = edge, 1 = weak and unconnected, 0 = none.
+    found: NDArray[np.int32],
+) -> int:
+    """Canny's edges of one patch; two pixels at its border have none.
 
     Thresholds follow the patch's mean gradient magnitude, so that faint patches have edges too.
 
     Parameters
     ----------
-    magnitude, angle : (41, 41) float32. edges : (41, 41) uint8, written.
-    stack : (1681, 2) int64, scratch.
+    magnitude, angle : (41, 41) float32.
+    edges : (41, 41) uint8, written: 2 = edge, 1 = weak and unconnected, 0 = none; zero at its
+    border of two pixels before and after.
+    found : (1681,) int32, written: edge pixels, 41 row + column each.
+
+    Returns
+    -------
+    How many edge pixels there are.
     """
-    mean = 0.0
-    for row in range(PATCH_SIDE):
-        for column in range(PATCH_SIDE):
-            mean += magnitude[row, column]
-    mean /= PATCH_SIDE * PATCH_SIDE
-    edges[:] = 0
-    n_stack = 0
+    mean = _mean(magnitude)
+    _thin(magnitude, angle, np.float32(_LOW) * mean, np.float32(_HIGH) * mean, edges)
+    n_found = 0
     for row in range(2, PATCH_SIDE - 2):
         for column in range(2, PATCH_SIDE - 2):
-            value = magnitude[row, column]
-            if value <= _LOW * mean or not _is_ridge(magnitude, angle, row, column):
-                continue
-            edges[row, column] = 1
-            if value > _HIGH * mean:
-                edges[row, column] = 2
-                stack[n_stack, 0], stack[n_stack, 1] = row, column
-                n_stack += 1
-    while n_stack > 0:
-        n_stack -= 1
-        row, column = stack[n_stack]
-        for down in range(-1, 2):
-            for right in range(-1, 2):
-                if edges[row + down, column + right] == 1:
-                    edges[row + down, column + right] = 2
-                    stack[n_stack, 0], stack[n_stack, 1] = row + down, column + right
-                    n_stack += 1
+            if edges[row, column] == 2:
+                found[n_found] = row * PATCH_SIDE + column
+                n_found += 1
+    flat = edges.reshape(PATCH_SIDE * PATCH_SIDE)
+    reached = 0
+    while reached < n_found:
+        at = found[reached]
+        reached += 1
+        for down in (-PATCH_SIDE, 0, PATCH_SIDE):
+            for near in (at + down - 1, at + down, at + down + 1):
+                if flat[np.uint32(near)] == 1:
+                    flat[np.uint32(near)] = 2
+                    found[n_found] = near
+                    n_found += 1
+    return n_found
 
 
 @kernel
-def _is_ridge(
-    magnitude: NDArray[np.float32], angle: NDArray[np.float32], row: int, column: int
-) -> bool:
-    """Not weaker than the neighbours across the edge; of two equal ones the second is taken."""
-    octant = int(8.0 * angle[row, column] + 0.5) % 4
-    right = 0 if octant == 2 else 1
-    down = 0 if octant == 0 else (-1 if octant == 3 else 1)
-    value = magnitude[row, column]
-    return bool(
-        value >= magnitude[row - down, column - right]
-        and value > magnitude[row + down, column + right]
-    )
+def _mean(magnitude: NDArray[np.float32]) -> np.float32:
+    """Column by column first, which the compiler turns into vectors."""
+    sums = np.zeros(PATCH_SIDE, np.float32)
+    for row in range(PATCH_SIDE):
+        for column in range(PATCH_SIDE):
+            sums[column] += magnitude[row, column]
+    total = np.float32(0.0)
+    for column in range(PATCH_SIDE):
+        total += sums[column]
+    return total / np.float32(PATCH_SIDE * PATCH_SIDE)
+
+
+@kernel
+def _thin(
+    magnitude: NDArray[np.float32],
+    angle: NDArray[np.float32],
+    low: np.float32,
+    high: np.float32,
+    edges: NDArray[np.uint8],
+) -> None:
+    """Keep what is not weaker than its neighbours across the edge; of two equals the second.
+
+    All four directions are compared without a branch: then the loop becomes vectors, eight times
+    as fast.
+    """
+    for row in range(2, PATCH_SIDE - 2):
+        above, here, below = magnitude[row - 1], magnitude[row], magnitude[row + 1]
+        for column in range(2, PATCH_SIDE - 2):
+            octant = np.int32(np.float32(8.0) * angle[row, column] + np.float32(0.5)) & 3
+            left, right = column - 1, column + 1
+            value = here[column]
+            tops = (
+                ((octant == 0) & (value >= here[left]) & (value > here[right]))
+                | ((octant == 1) & (value >= above[left]) & (value > below[right]))
+                | ((octant == 2) & (value >= above[column]) & (value > below[column]))
+                | ((octant == 3) & (value >= below[left]) & (value > above[right]))
+            )
+            weak = tops & (value > low)
+            edges[row, column] = np.uint8(weak) + np.uint8(weak & (value > high))
 
 
 @kernel

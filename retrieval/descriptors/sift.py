@@ -33,38 +33,56 @@ def describe_sift(magnitude: NDArray[np.float32], angle: NDArray[np.float32]) ->
     out = np.zeros((n, _CELLS * _CELLS * _DIRECTIONS), np.uint8)
     window, first, share = _axis()
     # One ring of spare cells takes the votes that fall outside.
+    line = np.empty((_CELLS + 2, _DIRECTIONS), np.float32)
     histogram = np.empty((_CELLS + 2, _CELLS + 2, _DIRECTIONS), np.float32)
     for i in range(n):
         histogram[:] = 0.0
         for row in range(1, PATCH_SIDE - 1):
-            top, down = first[row], share[row]
-            for column in range(1, PATCH_SIDE - 1):
-                weight = magnitude[i, row, column] * window[row] * window[column]
-                if weight == np.float32(0.0):
-                    continue
-                left, right = first[column], share[column]
-                direction = angle[i, row, column] * np.float32(_DIRECTIONS)
-                low = int(direction)
-                part = direction - np.float32(low)
-                low &= _DIRECTIONS - 1
-                high = (low + 1) & (_DIRECTIONS - 1)
-                lower, upper = weight * down, weight * (np.float32(1.0) - down)
-                for cell_row, vote in ((top, upper), (top + 1, lower)):
-                    beside = vote * right
-                    here = vote - beside
-                    histogram[cell_row, left, high] += here * part
-                    histogram[cell_row, left, low] += here - here * part
-                    histogram[cell_row, left + 1, high] += beside * part
-                    histogram[cell_row, left + 1, low] += beside - beside * part
+            line[:] = 0.0
+            _vote_line(magnitude[i, row], angle[i, row], window, first, share, line)
+            lower = window[row] * share[row]
+            upper = window[row] - lower
+            above, below = histogram[first[row]], histogram[first[row] + 1]
+            for cell in range(_CELLS + 2):
+                for k in range(_DIRECTIONS):
+                    above[cell, k] += upper * line[cell, k]
+                    below[cell, k] += lower * line[cell, k]
         _quantise(histogram, out[i])
     return out
 
 
 @kernel
-def _axis() -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.float32]]:
+def _vote_line(
+    magnitude: NDArray[np.float32],
+    angle: NDArray[np.float32],
+    window: NDArray[np.float32],
+    first: NDArray[np.uint32],
+    share: NDArray[np.float32],
+    line: NDArray[np.float32],
+) -> None:
+    """Votes of one row of pixels for its cells and directions, (6, 8); rows are weighed later."""
+    last = np.uint32(_DIRECTIONS - 1)
+    for column in range(1, PATCH_SIDE - 1):
+        weight = magnitude[column] * window[column]
+        direction = angle[column] * np.float32(_DIRECTIONS)
+        low = np.uint32(direction)
+        part = direction - np.float32(low)
+        high = (low + np.uint32(1)) & last
+        low &= last
+        left = first[column]
+        beside = weight * share[column]
+        here = weight - beside
+        line[left, high] += here * part
+        line[left, low] += here - here * part
+        line[left + np.uint32(1), high] += beside * part
+        line[left + np.uint32(1), low] += beside - beside * part
+
+
+@kernel
+def _axis() -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32]]:
     """Per row or column: Gaussian weight (two cells' deviation), cell before it, share beyond."""
     window = np.empty(PATCH_SIDE, np.float32)
-    first = np.empty(PATCH_SIDE, np.int64)
+    first = np.empty(PATCH_SIDE, np.uint32)
     share = np.empty(PATCH_SIDE, np.float32)
     cell = PATCH_SIDE / _CELLS
     for pixel in range(PATCH_SIDE):

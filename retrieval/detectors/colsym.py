@@ -78,9 +78,11 @@ def _blurred(pyramid: Pyramid, step: int) -> list[NDArray[np.float32]]:
     They are stretched like the grey photo and multiplied by their blur, so that the gradients of
     a structure are the same at whatever size it is seen.
     """
-    height, width = pyramid.rgb.shape[:2]
-    size = (width // step, height // step)
-    reduced = cv2.resize(pyramid.rgb, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    height, width = (side // step for side in pyramid.rgb.shape[:2])
+    # Whole blocks of step x step pixels only: else the reduction is not by `step`.
+    whole = pyramid.rgb[: height * step, : width * step]
+    small = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    reduced: NDArray[np.float32] = small.astype(np.float32)
     before, levels = CAMERA_SIGMA / step, []
     for radius in _RADII:
         sigma = _BLUR_PER_RADIUS * radius

@@ -1,8 +1,12 @@
-"""Synthetic photos whose geometry is known."""
+"""Synthetic photos whose geometry is known, and what is cut out of them."""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from contracts.records import Frames
+from retrieval.patches import PATCH_SIDE, cut_patches
+from retrieval.pyramid import Pyramid
 
 
 def facade(height: int = 360, width: int = 480, seed: int = 7) -> NDArray[np.uint8]:
@@ -37,3 +41,11 @@ def warp(picture: NDArray[np.uint8], matrix: NDArray[np.float64]) -> NDArray[np.
         ),
         np.uint8,
     )
+
+
+def all_patches(pyramid: Pyramid, frames: Frames) -> NDArray[np.float32]:
+    """The patches of all frames, in their order: (n, 41, 41) float32."""
+    patches = np.full((len(frames), PATCH_SIDE, PATCH_SIDE), np.nan, np.float32)
+    for rows, block in cut_patches(pyramid, frames):
+        patches[rows] = block
+    return patches

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from picture_scenes import facade, warp
+from picture_scenes import all_patches, facade, warp
 
 from contracts.config import DESCRIPTOR_SIZES, DESCRIPTORS, Descriptor
 from contracts.records import Frames
@@ -14,7 +14,7 @@ from retrieval.descriptors.shape_context import describe_shape_context
 from retrieval.descriptors.sift import describe_sift
 from retrieval.descriptors.surf import describe_surf
 from retrieval.detectors import detect
-from retrieval.patches import cut_patches, patch_gradients
+from retrieval.patches import patch_gradients
 from retrieval.pyramid import build_pyramid
 from retrieval.selection import no_frames
 
@@ -24,7 +24,7 @@ Image = NDArray[np.float64]
 @pytest.fixture(scope="module")
 def patches() -> NDArray[np.float32]:
     pyramid = build_pyramid(facade())
-    return cut_patches(pyramid, detect(pyramid, "hesaff", 25))
+    return all_patches(pyramid, detect(pyramid, "hesaff", 25))
 
 
 def _sift_oracle(magnitude: Image, angle: Image) -> Image:

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from picture_scenes import facade
+from picture_scenes import all_patches, facade
 
 from contracts.records import Frames
 from retrieval.detectors import detect
-from retrieval.patches import PATCH_SIDE, cut_patches, patch_gradients, turns
+from retrieval.patches import PATCH_SIDE, cut_patches, patch_gradients, sample_patches, turns
 from retrieval.pyramid import Level, build_pyramid
 from retrieval.selection import no_frames
 
@@ -57,21 +57,37 @@ def test_a_patch_is_the_photo_at_its_own_scale_seen_through_the_shape(
 ) -> None:
     pyramid = build_pyramid(facade())
     (level,) = [v for v in pyramid.sampling_levels() if v.sigma == pytest.approx(sigma)]
-    (patch,) = cut_patches(pyramid, frame)
+    (patch,) = all_patches(pyramid, frame)
     assert np.abs(patch - _oracle(level, frame)).max() < 0.02
+
+
+def test_every_frame_is_cut_once() -> None:
+    pyramid = build_pyramid(facade())
+    frames = detect(pyramid, "hesaff", 300)
+    rows = np.concatenate([rows for rows, _ in cut_patches(pyramid, frames)])
+    assert sorted(rows) == list(range(len(frames)))
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 2)])
+def test_the_smallest_pictures_are_sampled_within_them(size: tuple[int, int]) -> None:
+    pixels = np.random.default_rng(0).uniform(0, 255, size).astype(np.float32)
+    xy = np.array([[size[1] / 2, size[0] / 2]], np.float32)
+    (patch,) = sample_patches(pixels, xy, np.eye(2, dtype=np.float32)[None] * 20)
+    assert patch[0, 0] == pytest.approx(pixels[0, 0])
+    assert patch[-1, -1] == pytest.approx(pixels[-1, -1])
 
 
 def test_a_patch_does_not_depend_on_the_frames_beside_it() -> None:
     pyramid = build_pyramid(facade())
     frames = detect(pyramid, "hesaff", 60)
-    together = cut_patches(pyramid, frames)
+    together = all_patches(pyramid, frames)
     for i in range(len(frames)):
         one = Frames(frames.xy[i : i + 1], frames.shape[i : i + 1], frames.response[i : i + 1])
-        assert cut_patches(pyramid, one)[0].tobytes() == together[i].tobytes()
+        assert all_patches(pyramid, one)[0].tobytes() == together[i].tobytes()
 
 
 def test_no_frames_give_no_patches() -> None:
-    assert cut_patches(build_pyramid(facade()), no_frames()).shape == (0, 41, 41)
+    assert list(cut_patches(build_pyramid(facade()), no_frames())) == []
 
 
 def test_gradients_agree_with_numpy() -> None:
