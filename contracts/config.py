@@ -42,22 +42,34 @@ class _Frozen(BaseModel):
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
 
+FrameCount = Annotated[int, Field(ge=1, le=20_000)]
+
+
 class FeatureConfig(_Frozen):
     """How an image becomes descriptors (METHOD section 1)."""
 
     detectors: tuple[Detector, ...] = DETECTORS
     descriptors: tuple[Descriptor, ...] = DESCRIPTORS
-    max_frames: Annotated[int, Field(ge=1, le=20_000)] = 1000
+    max_frames: FrameCount = 1000
     """Frames kept per detector and image."""
+    max_frames_of: dict[Detector, FrameCount] = {}
+    """The same for some detectors, instead of `max_frames`."""
     max_side_px: Annotated[int, Field(ge=16, le=16_384)] = 1024
     max_pixels: Annotated[int, Field(ge=1)] = 250_000_000
 
     @model_validator(mode="after")
-    def _no_repeats(self) -> Self:
+    def _makes_sense(self) -> Self:
         for name, chosen in (("detectors", self.detectors), ("descriptors", self.descriptors)):
             if not chosen or len(set(chosen)) != len(chosen):
                 raise ValueError(f"{name} must be named once each, at least one; got {chosen}")
+        unknown = set(self.max_frames_of) - set(self.detectors)
+        if unknown:
+            raise ValueError(f"max_frames names {', '.join(sorted(unknown))}, which does not run")
         return self
+
+    def frames_of(self, detector: Detector) -> int:
+        """How many frames of a detector are kept at most."""
+        return self.max_frames_of.get(detector, self.max_frames)
 
     def channels(self) -> tuple[str, ...]:
         """Every detector-descriptor name, such as `hesaff-sift`, in index order."""

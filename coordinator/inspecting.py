@@ -73,7 +73,7 @@ def inspect_photo(path: Path, mask: Path | None, index: Configured) -> Inspectio
     seen = []
     for detector in config.detectors:
         started = time.perf_counter()
-        frames = detect(pyramid, detector, config.max_frames, usable)
+        frames = detect(pyramid, detector, config.frames_of(detector), usable)
         seconds = time.perf_counter() - started
         seen.append(_measured(detector, frames, decoded, seconds))
     photo = Photo(decoded, pyramid, {each.detector: each.frames for each in seen})

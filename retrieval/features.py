@@ -44,7 +44,7 @@ def extract(
     frames: dict[Detector, Frames] = {}
     descriptors: dict[str, NDArray[np.uint8]] = {}
     for detector in config.detectors:
-        found = detect(pyramid, detector, config.max_frames, usable)
+        found = detect(pyramid, detector, config.frames_of(detector), usable)
         frames[detector] = found
         described = describe(pyramid, found, config.descriptors)
         for descriptor in config.descriptors:

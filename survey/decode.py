@@ -36,6 +36,8 @@ _DAMAGED = (
     OverflowError,
     struct.error,
 )
+# Modes whose values can be averaged, unlike a palette's.
+_REDUCIBLE = {"L", "LA", "RGB", "RGBA", "CMYK", "YCbCr"}
 _PILLOW_GLOBALS = threading.Lock()
 _MASK_MAX_PIXELS = 250_000_000
 _MASKED_ABOVE = 32
@@ -239,9 +241,15 @@ def _pixels(image: Image.Image, size: tuple[int, int], mode: str) -> NDArray[np.
         image.draft(None, size)
     try:
         image.load()
-        return np.asarray(_eight_bits(image).convert(mode), np.uint8)
+        return np.asarray(_eight_bits(_reduced(image, size)).convert(mode), np.uint8)
     except _DAMAGED as error:
         raise UnusableImage(f"is truncated or damaged: {error}") from error
+
+
+def _reduced(image: Image.Image, size: tuple[int, int]) -> Image.Image:
+    """Means of whole blocks of pixels, before anything makes a second copy of a large picture."""
+    factor = min(image.width // size[0], image.height // size[1])
+    return image.reduce(factor) if factor > 1 and image.mode in _REDUCIBLE else image
 
 
 def _eight_bits(image: Image.Image) -> Image.Image:

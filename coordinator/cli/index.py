@@ -17,7 +17,14 @@ from contracts.config import (
     North,
 )
 from contracts.errors import BadConfig
-from coordinator.cli.lists import SOME_SKIPPED, Broker, Workers, names_among
+from coordinator.cli.lists import (
+    SOME_SKIPPED,
+    Broker,
+    MaxFrames,
+    Workers,
+    frame_limits,
+    names_among,
+)
 from coordinator.cli.show import bars, complain, list_skipped, tell
 
 NAME = "index"
@@ -46,7 +53,7 @@ def command(
     ] = None,
     detectors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DETECTORS),
     descriptors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DESCRIPTORS),
-    max_frames: Annotated[int, typer.Option(help="Frames a detector and image.")] = 1000,
+    max_frames: MaxFrames = None,
     max_words: Annotated[int, typer.Option(help="Largest codebook.")] = 20_000,
     seed: Annotated[int, typer.Option(help="Seed of the codebooks.")] = 0,
     stored_rotation: Annotated[
@@ -73,7 +80,7 @@ def command(
         features=FeatureConfig.of(
             detectors=names_among(detectors, DETECTORS, "--detectors"),
             descriptors=names_among(descriptors, DESCRIPTORS, "--descriptors"),
-            max_frames=max_frames,
+            **frame_limits(max_frames or ""),
         ),
         codebooks=CodebookConfig.of(max_words=max_words, seed=seed),
     )

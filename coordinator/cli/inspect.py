@@ -10,7 +10,7 @@ from rich.table import Table
 
 from contracts.config import DETECTORS, FeatureConfig, IndexConfig
 from contracts.errors import BadConfig
-from coordinator.cli.lists import names_among
+from coordinator.cli.lists import MaxFrames, frame_limits, names_among
 from coordinator.cli.outputs import result_file
 from coordinator.cli.show import stdout, tell
 
@@ -32,9 +32,7 @@ def command(
     detectors: Annotated[
         str | None, typer.Option(help=f"Which to run; default: {','.join(DETECTORS)}.")
     ] = None,
-    max_frames: Annotated[
-        int | None, typer.Option(help="Frames a detector; default: 1000.")
-    ] = None,
+    max_frames: MaxFrames = None,
     mask: Annotated[
         Path | None,
         typer.Option(help="An image, bright where the photo shows the vehicle: no frames there."),
@@ -90,13 +88,12 @@ def _picture_suffix(out: Path) -> str:
     return suffix
 
 
-def _features(detectors: str | None, max_frames: int | None) -> FeatureConfig:
-    usual = FeatureConfig()
+def _features(detectors: str | None, max_frames: str | None) -> FeatureConfig:
     return FeatureConfig.of(
-        detectors=usual.detectors
-        if detectors is None
-        else names_among(detectors, DETECTORS, "--detectors"),
-        max_frames=usual.max_frames if max_frames is None else max_frames,
+        detectors=names_among(
+            ",".join(DETECTORS) if detectors is None else detectors, DETECTORS, "--detectors"
+        ),
+        **frame_limits(max_frames or ""),
     )
 
 

@@ -42,6 +42,10 @@ Pair = Annotated[
 K = Annotated[str, typer.Option("--k", help="Words per keypoint: auto, or 1 to 10.")]
 Vote = Annotated[str, typer.Option(help="union, intersection or pairwise.")]
 Weights = Annotated[str, typer.Option(help="Any of idf,norm,burst; '' for none.")]
+MaxFrames = Annotated[
+    str | None,
+    typer.Option(help="Frames a detector and image, such as 1000 or 1000,orb=500; default: 1000."),
+]
 Descriptors = Annotated[
     str | None, typer.Option(help="Any of sift,surf,sc; default: all of the index.")
 ]
@@ -66,6 +70,29 @@ def names_among(text: str | None, known: Sequence[str], option: str) -> tuple[st
         if name in chosen[:at]:
             raise BadConfig(f"{option} names {name} twice; once is enough")
     return chosen
+
+
+def frame_limits(text: str) -> dict[str, object]:
+    """Read `1000`, `hesaff=1500,orb=500` or `800,orb=500` as settings of `FeatureConfig`.
+
+    Raises
+    ------
+    BadConfig : a part is neither a number nor detector=number.
+    """
+    settings: dict[str, object] = {}
+    limits: dict[str, int] = {}
+    for part in names(text):
+        detector, equals, number = part.rpartition("=")
+        if not number.isascii() or not number.isdigit() or bool(equals) != (detector in DETECTORS):
+            raise BadConfig(
+                "--max-frames takes a number, and detector=number for those that shall differ, "
+                f"such as 1000,orb=500; got {part!r}"
+            )
+        if equals:
+            limits[detector] = int(number)
+        else:
+            settings["max_frames"] = int(number)
+    return {**settings, "max_frames_of": limits}
 
 
 def search_config(

@@ -18,7 +18,7 @@ REGION_SIGMAS = 3.0**0.5
 
 _FLOOR = 1.0
 """In squared grey levels: a blob of about four grey levels' contrast after stretching."""
-_EXCESS = 1.5
+_EXCESSES = (1.5, 4.0)
 """Affine adaptation is paid for this many times the frames asked, as some do not converge."""
 
 
@@ -29,9 +29,13 @@ def detect_hesaff(
     shape = (pyramid.grey.shape[0], pyramid.grey.shape[1])
     rounds = _find_blobs(pyramid)
     rounds = take(rounds, inside(rounds, shape, usable))
-    rounds = spread(rounds, shape, int(np.ceil(_EXCESS * max_frames)))
-    adapted = adapt_shapes(pyramid, rounds, REGION_SIGMAS)
-    adapted = take(adapted, inside(adapted, shape, usable))
+    adapted = no_frames()
+    for excess in _EXCESSES:
+        tried = spread(rounds, shape, int(np.ceil(excess * max_frames)))
+        adapted = adapt_shapes(pyramid, tried, REGION_SIGMAS)
+        adapted = take(adapted, inside(adapted, shape, usable))
+        if len(adapted) >= max_frames or len(tried) == len(rounds):
+            break
     return spread(adapted, shape, max_frames)
 
 

@@ -215,6 +215,8 @@ def test_a_name_that_no_font_has_is_drawn_all_the_same(photo: Path, tmp_path: Pa
         (("{photo}", "--out", "/proc/none/o.png"), "cannot write /proc/none/o.png"),
         (("{photo}", "--out", "o.png", "--detectors", "x"), "--detectors takes any of"),
         (("{photo}", "--out", "o.png", "--max-frames", "0"), "max_frames"),
+        (("{photo}", "--out", "o.png", "--max-frames", "9,orbs=5"), "got 'orbs=5'"),
+        (("{photo}", "--out", "o.png", "--max-frames", "orb=many"), "got 'orb=many'"),
         (("{photo}", "--out", "o.png", "--index", "none"), "none"),
         (("{photo}", "--out", "o.png", "--index", ".", *FEW), "--index brings its own"),
     ],

@@ -138,7 +138,7 @@ def test_bad_photos_stop_no_other(mixed: tuple[Path, int, dict[str, Any]], tmp_p
         ((), "--crs EPSG:2154"),
         (("--crs", "EPSG:27700"), "far outside the area of use"),
         (("--format", "shapefile"), "stereopolis, table, exif, plain"),
-        ((*SMALL, "--detectors", "hesaff,sift"), "hesaff,mser,star,har,orb; got 'sift'"),
+        ((*SMALL, "--detectors", "hesaff,sift"), "hesaff,mser,star,har,orb,colsym; got 'sift'"),
         ((*SMALL, "--descriptors", "sc,sc"), "names sc twice"),
         ((*SMALL, "--also", "nowhere"), "NAME=SURVEY"),
         ((*SMALL, "--also", "a/b=."), "NAME=SURVEY"),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from picture_scenes import facade
 
 from contracts.config import DESCRIPTOR_SIZES, FeatureConfig
+from contracts.errors import BadConfig
 from retrieval.features import Features, extract
 
 ROOT = Path(__file__).parents[2]
@@ -33,6 +34,17 @@ def test_every_channel_is_described_frame_by_frame() -> None:
 def test_only_what_is_configured_is_extracted() -> None:
     config = FeatureConfig(detectors=("orb", "star"), descriptors=("sc",), max_frames=30)
     assert list(extract(facade(), None, config).descriptors) == ["orb-sc", "star-sc"]
+
+
+def test_every_detector_keeps_as_many_frames_as_it_may() -> None:
+    config = FeatureConfig(max_frames=60, max_frames_of={"orb": 20, "har": 90})
+    found = {name: len(frames) for name, frames in extract(facade(), None, config).frames.items()}
+    assert found == {**dict.fromkeys(config.detectors, 60), "orb": 20, "har": 90}
+
+
+def test_frames_asked_of_a_detector_that_does_not_run_are_refused() -> None:
+    with pytest.raises(BadConfig, match="max_frames names orb"):
+        FeatureConfig.of(detectors=("har",), max_frames_of={"orb": 20})
 
 
 def test_the_same_photo_gives_the_same_bytes() -> None:

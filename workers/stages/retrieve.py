@@ -80,7 +80,7 @@ def read_photo(index: Configured, path: str) -> Photo:
     config = index.config.features
     decoded = decode_image(path, max_side_px=config.max_side_px, max_pixels=config.max_pixels)
     pyramid = build_pyramid(decoded.rgb)
-    frames = {name: detect(pyramid, name, config.max_frames) for name in config.detectors}
+    frames = {name: detect(pyramid, name, config.frames_of(name)) for name in config.detectors}
     return Photo(decoded, pyramid, frames)
 
 
