@@ -4,10 +4,10 @@ import os
 import sys
 from pathlib import Path
 
-from benchmarks import default_model, kth, stereopolis, workers
+from benchmarks import default_model, features, kth, stereopolis, workers
 
 FIGURES = {"stereopolis": stereopolis.run, "kth": kth.run, "workers": workers.run}
-BENCHMARKS = {**FIGURES, "default-model": default_model.run}
+BENCHMARKS = {**FIGURES, "features": features.run, "default-model": default_model.run}
 
 
 def main() -> None:
