@@ -11,7 +11,6 @@ from retrieval.detectors import detect
 from retrieval.detectors.affine import adapt_shapes
 from retrieval.detectors.har import harris_response
 from retrieval.detectors.hesaff import REGION_SIGMAS, hessian_response
-from retrieval.detectors.mser import distinct_regions, region_moments
 from retrieval.pyramid import build_pyramid
 from retrieval.selection import round_frames
 
@@ -144,31 +143,6 @@ def test_affine_adaptation_measures_a_stretched_spot(across: float, along: float
     # Fixed smoothing rounds a stretched spot off; the direction and most of the ratio remain.
     assert shape[1, 1] / shape[0, 0] == pytest.approx(along / across, rel=0.25)
     assert (shape[1, 1] > shape[0, 0]) == (along > across)
-
-
-def test_a_region_becomes_the_ellipse_of_its_moments() -> None:
-    turn = np.radians(30)
-    true = np.array([[20 * np.cos(turn), -8 * np.sin(turn)], [20 * np.sin(turn), 8 * np.cos(turn)]])
-    y, x = np.mgrid[:100, :120]
-    seen = np.linalg.inv(true) @ np.stack((x.ravel() - 60.5, y.ravel() - 45.25))
-    inner = (seen**2).sum(axis=0) <= 1
-    points = np.stack((x.ravel()[inner], y.ravel()[inner]), axis=1).astype(np.int32)
-    line = np.stack((np.arange(40), np.full(40, 7)), axis=1).astype(np.int32)
-    starts = np.array([0, len(points), len(points) + 40])
-    grey = np.full((100, 120), 90, np.uint8)
-    xy, shape, level = region_moments(np.concatenate((points, line)), starts, grey)
-    assert np.allclose(xy[0], points.mean(axis=0), atol=1e-4)
-    assert np.allclose(shape[0] @ shape[0].T, 4 * np.cov(points.T, bias=True), rtol=1e-4)
-    assert np.allclose(shape[0] @ shape[0].T, true @ true.T, rtol=0.03, atol=3)
-    assert shape[0, 0, 1] == 0
-    assert level[0] == 90
-    assert (shape[1] == 0).all()
-
-
-def test_near_copies_of_a_better_region_are_dropped() -> None:
-    xy = np.array([[50, 50], [51, 50], [50, 50], [54, 50], [51, 51]], np.float32)
-    radius = np.array([10, 11, 14, 10, 10], np.float32)
-    assert distinct_regions(xy, radius).tolist() == [True, False, True, True, False]
 
 
 def test_responses_agree_with_plain_numpy() -> None:
