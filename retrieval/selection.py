@@ -7,8 +7,8 @@ from contracts.records import Frames
 
 _RIM_POINTS = 16
 _MAX_RIM_OUTSIDE = 0.125
-_POOL = 3
-_CELLS = 100
+_POOL = 5
+_CELLS = 49
 
 
 def no_frames() -> Frames:
@@ -35,6 +35,16 @@ def mean_radius(shape: NDArray[np.float32]) -> NDArray[np.float32]:
 def take(frames: Frames, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Frames:
     """Return the frames of the given rows, in that order."""
     return Frames(frames.xy[rows], frames.shape[rows], frames.response[rows])
+
+
+def favour_large(frames: Frames) -> Frames:
+    """Multiply responses by the regions' areas; best first no more.
+
+    Of two regions that stand out equally the larger is found again more often, above all in a
+    smaller, blurred or grainy photo (docs/decisions/0009).
+    """
+    area = mean_radius(frames.shape) ** 2
+    return Frames(frames.xy, frames.shape, (frames.response * area).astype(np.float32))
 
 
 def sort_frames(frames: Frames) -> Frames:
@@ -93,7 +103,7 @@ def _is_usable(
 def spread(frames: Frames, image_shape: tuple[int, int], max_frames: int) -> Frames:
     """Keep at most `max_frames`, best first and spread over the picture.
 
-    The strongest 3 * max_frames compete. The picture is cut into about 100 square cells, and a
+    The strongest 5 * max_frames compete. The picture is cut into about 49 square cells, and a
     cell may fill its quota with its best frames; the quota is the largest that keeps within
     `max_frames`, and what is left goes to the strongest of those refused. So a cluttered corner
     cannot take all, and a sky's noise does not displace a facade.

@@ -15,6 +15,8 @@ _WINDOW = 19
 _MAX_ROUNDS = 16
 _CONVERGED = 0.05
 _MAX_STRETCH = 6.0
+_SHARPER = 2.0 / 3.0
+"""Octaves from the level seen to the frame's scale: at its own, a shape is smoothed too round."""
 
 
 def adapt_shapes(pyramid: Pyramid, frames: Frames, region_sigmas: float) -> Frames:
@@ -35,7 +37,8 @@ def adapt_shapes(pyramid: Pyramid, frames: Frames, region_sigmas: float) -> Fram
     radius = frames.shape[:, 0, 0]
     sigmas = radius / np.float32(region_sigmas)
     bounds = np.array([level.sigma for level in levels], np.float32)
-    nearest = np.abs(np.log2(sigmas[:, None] / bounds[None, :])).argmin(axis=1)
+    octaves_off = np.log2(sigmas[:, None] / bounds[None, :]) - _SHARPER
+    nearest = np.abs(octaves_off).argmin(axis=1)
     unit = np.zeros((len(frames), 2, 2), np.float32)
     for i in np.unique(nearest):
         rows = np.flatnonzero(nearest == i)

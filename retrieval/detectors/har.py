@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from contracts.records import Frames
 from retrieval.kernels import kernel
 from retrieval.pyramid import LEVELS_PER_OCTAVE, Level, Pyramid
-from retrieval.selection import inside, no_frames, round_frames, spread, take
+from retrieval.selection import favour_large, inside, no_frames, round_frames, spread, take
 
-_REGION_SIGMAS = 3.0**0.5 * 1.4
+_REGION_SIGMAS = 3.0**0.5 * 2.0
 """Region radius in units of the differentiation scale; corners show little inside it."""
 _INTEGRATION = 1.4
 """Integration scale over differentiation scale."""
@@ -42,7 +42,7 @@ def _find(
     usable: NDArray[np.bool_] | None,
 ) -> Frames:
     found = np.concatenate([_find_in_octave(octave) for octave in octaves])
-    frames = round_frames(found[:, :2], found[:, 2], found[:, 3])
+    frames = favour_large(round_frames(found[:, :2], found[:, 2], found[:, 3]))
     return take(frames, inside(frames, shape, usable))
 
 

@@ -11,7 +11,7 @@ from retrieval.detectors.affine import adapt_shapes
 from retrieval.detectors.extrema import find_extrema
 from retrieval.kernels import kernel
 from retrieval.pyramid import LEVELS_PER_OCTAVE, Level, Pyramid
-from retrieval.selection import inside, no_frames, round_frames, sort_frames, spread, take
+from retrieval.selection import favour_large, inside, no_frames, round_frames, spread, take
 
 REGION_SIGMAS = 3.0**0.5
 """Region radius in units of the detection scale (Perdoch's, less the magnification of 3)."""
@@ -44,7 +44,7 @@ def _find_blobs(pyramid: Pyramid) -> Frames:
     if not parts:
         return no_frames()
     found = np.concatenate(parts)
-    return sort_frames(round_frames(found[:, :2], found[:, 2], found[:, 3]))
+    return favour_large(round_frames(found[:, :2], found[:, 2], found[:, 3]))
 
 
 def _find_in_octave(octave: tuple[Level, ...]) -> NDArray[np.float32]:

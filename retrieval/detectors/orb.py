@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from contracts.records import Frames
 from retrieval.pyramid import Pyramid
-from retrieval.selection import inside, no_frames, round_frames, spread, take
+from retrieval.selection import favour_large, inside, no_frames, round_frames, spread, take
 
 _FAST_THRESHOLDS = (20, 7)
 _EXCESS = 4
@@ -35,7 +35,9 @@ def detect_orb(
         if not found:
             continue
         table = np.array([(k.pt[0], k.pt[1], k.size, k.response) for k in found], np.float32)
-        frames = round_frames(table[:, :2], _RADIUS_PER_SIZE * table[:, 2], table[:, 3])
+        frames = favour_large(
+            round_frames(table[:, :2], _RADIUS_PER_SIZE * table[:, 2], table[:, 3])
+        )
         frames = take(frames, inside(frames, shape, usable))
         if len(frames) >= _ENOUGH * max_frames:
             break

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from contracts.records import Frames
 from retrieval.pyramid import Pyramid
-from retrieval.selection import inside, no_frames, round_frames, spread, take
+from retrieval.selection import favour_large, inside, no_frames, round_frames, spread, take
 
 _MAX_SIZE = 45
 _THRESHOLDS = (5, 2)
@@ -41,7 +41,9 @@ def detect_star(
             continue
         rows = [(k.pt[0] - _PAD, k.pt[1] - _PAD, k.size, abs(k.response)) for k in found]
         table = np.array(rows, np.float32)
-        frames = round_frames(table[:, :2], _RADIUS_PER_SIZE * table[:, 2], table[:, 3])
+        frames = favour_large(
+            round_frames(table[:, :2], _RADIUS_PER_SIZE * table[:, 2], table[:, 3])
+        )
         frames = take(frames, inside(frames, shape, usable))
         if len(frames) >= _ENOUGH * max_frames:
             break

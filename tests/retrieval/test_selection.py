@@ -24,8 +24,8 @@ def _quota_oracle(frames: Frames, max_frames: int) -> set[tuple[float, float]]:
     """Deal frames to cells one round after the other, the strongest first in each round."""
     ranked = sorted(
         range(len(frames)), key=lambda i: (-frames.response[i], frames.xy[i, 1], frames.xy[i, 0])
-    )[: 3 * max_frames]
-    side = (SHAPE[0] * SHAPE[1] / 100) ** 0.5
+    )[: 5 * max_frames]
+    side = (SHAPE[0] * SHAPE[1] / 49) ** 0.5
     cells: dict[tuple[int, int], list[int]] = {}
     for i in ranked:
         cells.setdefault((int(frames.xy[i, 1] // side), int(frames.xy[i, 0] // side)), []).append(i)
