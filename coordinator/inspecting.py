@@ -76,7 +76,7 @@ def inspect_photo(path: Path, mask: Path | None, index: Configured) -> Inspectio
         frames = detect(pyramid, detector, config.frames_of(detector), usable)
         seconds = time.perf_counter() - started
         seen.append(_measured(detector, frames, decoded, seconds))
-    photo = Photo(decoded, pyramid, {each.detector: each.frames for each in seen})
+    photo = Photo(decoded, pyramid, config, {each.detector: each.frames for each in seen})
     return Inspection(path.name, decoded, usable, tuple(seen), choose(index, photo, SearchConfig()))
 
 

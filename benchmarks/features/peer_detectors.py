@@ -22,6 +22,7 @@ _THRESHOLD = 16 / 3
 _MAGNIFICATION = 3.0
 """pyhesaff gives the ellipse that it describes: 3 times the region."""
 _TRIALS = 6
+_NO_LIMIT = 20_000
 _HARRIS_RADIUS_PER_SIZE = 0.7
 """Makes the median region of OpenCV's Harris-Laplace as large as that of ours."""
 
@@ -40,16 +41,20 @@ def find_hessian(rgb: Picture) -> dict[str, Described]:
     """Ours beside pyhesaff 2.2 (Perdoch's program), which reports no response.
 
     Once with all that its default threshold finds, once with its threshold raised until at most
-    1000 are left, each beside as many of ours.
+    1000 are left, each beside as many of ours: spread over the picture, as Flaneur uses them, and
+    the strongest, as pyhesaff's are.
     """
     grey = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), np.uint8)
     pyramid = build_pyramid(rgb)
+    every = detect(pyramid, "hesaff", _NO_LIMIT)
     found = {}
     for title, threshold in (("best", _threshold_for(grey)), ("all", _THRESHOLD)):
         ellipses, vectors = _hesaff.detect_image(grey, threshold=threshold)
         theirs = _frames_of(ellipses)
-        ours = detect(pyramid, "hesaff", max(len(theirs), 1))
-        found[f"ours, {title}"] = Described(ours, _our_sift(pyramid, ours))
+        number = max(len(theirs), 1)
+        strongest = take(every, np.arange(min(number, len(every))))
+        for kind, ours in (("spread", detect(pyramid, "hesaff", number)), ("strongest", strongest)):
+            found[f"ours, {title}, {kind}"] = Described(ours, _our_sift(pyramid, ours))
         names = {"its sift": vectors, "its sift, rooted": rooted(vectors)}
         both = Described(theirs, {**_our_sift(pyramid, theirs), **names})
         found[f"pyhesaff, {title}"] = both

@@ -2,7 +2,7 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -12,6 +12,7 @@ import numba
 import numpy as np
 import pycolmap
 from numpy.typing import NDArray
+from pyhesaff import _hesaff
 
 from benchmarks.table import print_table
 from contracts.config import DESCRIPTORS, DETECTORS, FeatureConfig
@@ -24,6 +25,8 @@ from survey import decode_image
 N_PHOTOS = 12
 ROUNDS = 3
 COLMAP_FEATURES = 2000
+WHOLE = f"whole: decode, {len(DETECTORS)} detectors x {len(DESCRIPTORS)} descriptors"
+COLMAP = f"COLMAP {pycolmap.__version__} SIFT, {COLMAP_FEATURES} features"
 
 _T = TypeVar("_T")
 
@@ -41,22 +44,19 @@ def run(data: Path) -> None:
     photos = every[:: max(len(every) // N_PHOTOS, 1)][:N_PHOTOS]
     best = [_best_of_rounds(photo) for photo in photos]
     mean = {step: 1000 * sum(times[step] for times in best) / len(best) for step in best[0]}
-    whole, peer = mean.pop("whole"), mean.pop("COLMAP")
-    rows = [(step, f"{value:.1f}") for step, value in mean.items()]
     print(
         f"{len(photos)} photographs of 1024 px, {FeatureConfig().max_frames} frames a detector, "
-        f"one thread, best of {ROUNDS} rounds, decoding included"
+        f"one thread, best of {ROUNDS} rounds, decoding included\n"
     )
-    print_table(
-        ("step", "ms a photo"),
-        (
-            *rows,
-            (f"{len(DETECTORS)} detectors x {len(DESCRIPTORS)} descriptors, whole", f"{whole:.0f}"),
-            (f"COLMAP {pycolmap.__version__} SIFT, {COLMAP_FEATURES} features", f"{peer:.0f}"),
-        ),
-    )
-    slowest = max(1000 * times["whole"] for times in best)
-    print(f"\nSlowest photograph {slowest:.0f} ms; whole / COLMAP {whole / peer:.2f}")
+    print_table(("step", "ms a photo"), [(step, f"{mean[step]:.0f}") for step in _order(mean)])
+    slowest = max(1000 * times[WHOLE] for times in best)
+    print(f"\nSlowest photograph {slowest:.0f} ms; whole / COLMAP {mean[WHOLE] / mean[COLMAP]:.2f}")
+
+
+def _order(steps: Iterable[str]) -> list[str]:
+    """Detectors, then descriptors, then the whole, then peers."""
+    first = ["decode", "pyramid", *DETECTORS]
+    return sorted(steps, key=lambda step: first.index(step) if step in first else len(first))
 
 
 def _best_of_rounds(photo: Path) -> Mapping[str, float]:
@@ -82,11 +82,23 @@ def _steps(photo: Path) -> dict[str, float]:
     for detector in DETECTORS:
         frames = timed(detector, partial(detect, pyramid, detector, config.frames_of(detector)))
         for descriptor in DESCRIPTORS:
-            timed(f"{descriptor} alone", partial(describe, pyramid, frames, (descriptor,)))
-        timed("all descriptors", partial(describe, pyramid, frames, DESCRIPTORS))
-    timed("whole", lambda: extract(decode_image(photo).rgb, None, config))
-    timed("COLMAP", partial(_colmap, photo))
+            timed(f"{descriptor}, alone", partial(describe, pyramid, frames, (descriptor,)))
+        timed("the three descriptors", partial(describe, pyramid, frames, DESCRIPTORS))
+    timed(WHOLE, lambda: extract(decode_image(photo).rgb, None, config))
+    timed(COLMAP, partial(_colmap, photo))
+    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+    for name, program in _peers().items():
+        timed(name, partial(program, grey))
     return seconds
+
+
+def _peers() -> dict[str, Callable[[NDArray[np.uint8]], object]]:
+    """What other programs' detectors take for a grey picture, by their defaults."""
+    return {
+        "pyhesaff, frames and its SIFT": _hesaff.detect_image,
+        "OpenCV Harris-Laplace": cv2.xfeatures2d.HarrisLaplaceFeatureDetector.create().detect,
+        "OpenCV MSER": cv2.MSER.create().detectRegions,
+    }
 
 
 def _colmap(photo: Path) -> NDArray[np.float32]:

@@ -92,7 +92,7 @@ def test_the_report_counts_the_frames_and_gives_the_choice_of_locate(
     chosen = choose(asked, read, SearchConfig())
     assert tuple(each["detector"] for each in report["detectors"]) == DETECTORS
     for each in report["detectors"]:
-        frames = read.frames[each["detector"]]
+        frames = read.frames(each["detector"])
         assert each["n_frames"] == len(frames) > 0
         assert each["chosen"] == (each["detector"] in chosen.detectors)
         assert 0 < each["coverage"] <= min(1, len(frames) / 100)

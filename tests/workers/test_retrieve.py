@@ -66,6 +66,16 @@ def chosen_with(
     return choose(_Index(), photo, search)
 
 
+def test_only_frames_that_are_asked_for_are_found(
+    photo: Photo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen_with(None, photo, SearchConfig(), monkeypatch)
+    chosen_with(None, photo, SearchConfig(pair=("star", "mser"), k=2), monkeypatch)
+    assert not photo.found
+    assert len(photo.frames("star")) > 0
+    assert set(photo.found) == {"star"}
+
+
 def test_a_model_worth_using_chooses_and_predicts(
     photo: Photo, monkeypatch: pytest.MonkeyPatch
 ) -> None:

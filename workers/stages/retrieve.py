@@ -1,7 +1,7 @@
 """Retrieve: a photo, a choice of detectors and k, and the fusion of their inverted indices."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from contracts.config import Descriptor, Detector, IndexConfig, SearchConfig
+from contracts.config import Descriptor, Detector, FeatureConfig, IndexConfig, SearchConfig
 from contracts.errors import BadConfig
 from contracts.records import Frames
 from index.models import read_model
@@ -56,22 +56,33 @@ def open_index(root: str, generation: int) -> OpenedIndex:
 
 @dataclass(frozen=True, slots=True)
 class Photo:
-    """A query photo: what was decoded, and the frames of every detector of the index."""
+    """A query photo: what was decoded, and the frames of the detectors that were asked for.
+
+    found : frames by detector; the others are found when they are first asked for.
+    """
 
     decoded: DecodedImage
     pyramid: Pyramid
-    frames: Mapping[Detector, Frames]
+    config: FeatureConfig
+    found: dict[Detector, Frames] = field(default_factory=dict)
+
+    def frames(self, detector: Detector) -> Frames:
+        """The frames of one detector, as the index's images have them."""
+        if detector not in self.found:
+            limit = self.config.frames_of(detector)
+            self.found[detector] = detect(self.pyramid, detector, limit)
+        return self.found[detector]
 
     def complementarity(
         self, detectors: Sequence[Detector]
     ) -> dict[tuple[Detector, Detector], Complementarity]:
         """The four scores of every pair of `detectors`, in the order of the index."""
         height, width = self.decoded.rgb.shape[:2]
-        return all_pairs({name: self.frames[name] for name in detectors}, width, height)
+        return all_pairs({name: self.frames(name) for name in detectors}, width, height)
 
 
 def read_photo(index: Configured, path: str) -> Photo:
-    """Decode a photo as the index's images were, and find its frames.
+    """Decode a photo as the index's images were.
 
     Raises
     ------
@@ -79,9 +90,7 @@ def read_photo(index: Configured, path: str) -> Photo:
     """
     config = index.config.features
     decoded = decode_image(path, max_side_px=config.max_side_px, max_pixels=config.max_pixels)
-    pyramid = build_pyramid(decoded.rgb)
-    frames = {name: detect(pyramid, name, config.frames_of(name)) for name in config.detectors}
-    return Photo(decoded, pyramid, frames)
+    return Photo(decoded, build_pyramid(decoded.rgb), config)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,12 +165,12 @@ def nearest_words(
     k: int,
 ) -> dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]:
     """Describe one detector's frames and find their k nearest words, by channel."""
-    if detector not in photo.frames:
+    if detector not in photo.config.detectors:
         raise BadConfig(
             f"{index.root} has no detector {detector!r}; it was indexed with "
             f"{', '.join(index.config.features.detectors)}. Choose from these or index again."
         )
-    described = describe(photo.pyramid, photo.frames[detector], descriptors)
+    described = describe(photo.pyramid, photo.frames(detector), descriptors)
     return {
         f"{detector}-{name}": index.searcher(f"{detector}-{name}").nearest(described[name], k)
         for name in descriptors
