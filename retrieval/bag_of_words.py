@@ -5,12 +5,12 @@ images is 1; the photo's own is counted.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from contracts.errors import BadIndex
 from contracts.records import Postings
 from retrieval.fusion import Scores
+from retrieval.kernels import kernel
 
 
 def score_bag_of_words(
@@ -33,7 +33,7 @@ def score_bag_of_words(
     return Scores(values / np.sqrt(np.maximum(squares, 1e-12)), values > 0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sums(
     indptr: NDArray[np.int64],
     image_ids: NDArray[np.uint32],

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from contracts.config import Detector
 from contracts.records import Frames
+from retrieval.kernels import kernel
 
 _MAX_SPREAD_POINTS = 2_000
 _SAME_POINT_PX = 1.0
@@ -132,7 +132,7 @@ def _in_raster_order(xy: _Points) -> _Points:
     return xy[np.lexsort((xy[:, 0], xy[:, 1]))]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _thinned(xy: _Points, apart_px: float) -> _Points:
     """Drop points closer than `apart_px` to a kept one before; xy in raster order."""
     kept = np.empty_like(xy)
@@ -152,7 +152,7 @@ def _thinned(xy: _Points, apart_px: float) -> _Points:
     return kept[:n_kept]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # a check for 0 would stop the vectors
+@kernel
 def _inverse_distances(x: NDArray[np.float32], y: NDArray[np.float32]) -> float:
     """Sum 1 / distance over unordered pairs; none may coincide."""
     sums = np.zeros(len(x), dtype=np.float64)
@@ -163,7 +163,7 @@ def _inverse_distances(x: NDArray[np.float32], y: NDArray[np.float32]) -> float:
     return float(sums.sum())
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_alone(points: _Points, others: _Points, near_px: float) -> int:
     """Count points without any of `others` within `near_px`; both in raster order."""
     alone = first = 0
@@ -183,7 +183,7 @@ def _count_alone(points: _Points, others: _Points, near_px: float) -> int:
     return alone
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _leader_clusters(xy: _Points, radius_px: float) -> NDArray[np.int64]:
     """Join the nearest leader within the radius, the earlier if equal, or become one."""
     cluster = np.empty(len(xy), dtype=np.int64)

@@ -11,8 +11,9 @@ none at all when nothing is removed. Votes are added to `score`, one more voting
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from retrieval.kernels import kernel
 
 BAD_IMAGE = -1
 
@@ -21,7 +22,7 @@ _Floats = NDArray[np.float64]
 _Offsets = NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def gather(
     image_ids: NDArray[np.uint32],
     spans: _Offsets,
@@ -54,7 +55,7 @@ def gather(
     return filled
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _words_kept(segments: _Offsets, point: int, descriptor: int) -> int:
     kept = 0
     for rank in range(segments.shape[2]):
@@ -63,7 +64,7 @@ def _words_kept(segments: _Offsets, point: int, descriptor: int) -> int:
     return kept
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def is_skipped(segments: _Offsets, point: int) -> bool:
     for descriptor in range(segments.shape[1]):
         if _words_kept(segments, point, descriptor) == 0:
@@ -71,7 +72,7 @@ def is_skipped(segments: _Offsets, point: int) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def give_votes(
     images: NDArray[np.uint32],
     segments: _Offsets,
@@ -97,7 +98,7 @@ def give_votes(
                     voters[image] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def vote_union(
     images: NDArray[np.uint32],
     segments: _Offsets,
@@ -137,7 +138,7 @@ def vote_union(
         give_votes(images, segments, weights, point, seen, token + 1 + point, score, voters)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def vote_intersection(
     lists: tuple[NDArray[np.uint32], ...],
     spans: _Offsets,
@@ -185,7 +186,7 @@ def vote_intersection(
     return 0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def vote_pairwise(
     images: NDArray[np.uint32],
     segments: _Offsets,

@@ -6,17 +6,17 @@ among the cells' next ones: the same pairs as from that algorithm's heap, withou
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from retrieval.fusion_kernels import give_votes, is_skipped
+from retrieval.kernels import kernel
 
 _Seen = NDArray[np.int32]
 _Floats = NDArray[np.float64]
 _Offsets = NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_new(images: NDArray[np.uint32], start: int, stop: int, seen: _Seen, token: int) -> int:
     fresh = 0
     for at in range(start, stop):
@@ -27,7 +27,7 @@ def _count_new(images: NDArray[np.uint32], start: int, stop: int, seen: _Seen, t
     return fresh
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _join(
     cells: _Offsets,
     cell_distance: _Floats,
@@ -69,7 +69,7 @@ def _join(
     return joined[:taken], joined_distance[:taken]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def vote_union_walk(
     images: NDArray[np.uint32],
     segments: _Offsets,

@@ -12,7 +12,9 @@ _R = TypeVar("_R")
 def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile `function` on its first call and keep the result in numba's on-disk cache.
 
-    Neither fastmath nor parallel: the same input gives the same bytes on any thread count. The
-    cast keeps the signature for type checkers, as numba itself has none.
+    Neither fastmath nor parallel: the same input gives the same bytes on any thread count.
+    Division by zero gives inf or nan, as in numpy: a check for it would keep loops from becoming
+    vectors. The cast keeps the signature for type checkers, as numba itself has none.
     """
-    return cast(Callable[_P, _R], numba.njit(cache=True, nogil=True)(function))
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return cast(Callable[_P, _R], compiled)

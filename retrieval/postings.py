@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from contracts.errors import BadIndex, VocabularyMismatch, WrongInput
 from contracts.records import Postings
+from retrieval.kernels import kernel
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -172,7 +172,7 @@ def _unique_within_words(indptr: NDArray[np.int64], image_ids: NDArray[np.uint32
     return Postings(kept, image_ids[: kept[-1]].copy() if kept[-1] < len(image_ids) else image_ids)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _place_by_word(
     word_ids: NDArray[np.int32],
     image_ids: NDArray[np.uint32],
@@ -186,7 +186,7 @@ def _place_by_word(
         filled[word] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _append(
     indptr: NDArray[np.int64],
     image_ids: NDArray[np.uint32],
@@ -201,7 +201,7 @@ def _append(
         filled[word] = at
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sort_and_drop_repeats(
     indptr: NDArray[np.int64], image_ids: NDArray[np.uint32], kept: NDArray[np.int64]
 ) -> None:
@@ -222,7 +222,7 @@ def _sort_and_drop_repeats(
         kept[word + 1] = at
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_kept(
     indptr: NDArray[np.int64],
     image_ids: NDArray[np.uint32],
@@ -239,7 +239,7 @@ def _count_kept(
     return _IN_ORDER
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_images(image_ids: NDArray[np.uint32], counts: NDArray[np.int64]) -> int:
     for i in range(len(image_ids)):
         image = image_ids[i]

@@ -11,9 +11,12 @@ import pytest
 from numpy.typing import NDArray
 from picture_scenes import facade
 
-from contracts.config import DESCRIPTOR_SIZES, FeatureConfig
+from contracts.config import DESCRIPTOR_SIZES, DETECTORS, FeatureConfig
 from contracts.errors import BadConfig
+from retrieval.detectors import detect
 from retrieval.features import Features, extract
+from retrieval.pyramid import build_pyramid
+from survey import decode_image
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("FLANEUR_TEST_DATA", ROOT.parent / "shared" / "data"))
@@ -104,6 +107,16 @@ def test_warming_up_compiles_all_that_a_photo_needs() -> None:
     assert done.returncode == 0, done.stderr
     # Three descriptors, two steps of patches and eight of the detectors, at least.
     assert int(done.stdout) >= 13
+
+
+def test_every_old_photograph_has_frames_of_most_detectors(test_data: Path) -> None:
+    """Faded, halftoned, low in contrast, one of them 457 pixels wide."""
+    photos = sorted((test_data / "budaors" / "then").iterdir())
+    assert len(photos) == 9
+    for photo in photos:
+        pyramid = build_pyramid(decode_image(photo).rgb)
+        found = [len(detect(pyramid, detector, 1000)) for detector in DETECTORS]
+        assert sum(number >= 300 for number in found) >= 4, (photo.name, found)
 
 
 def _photo(name: str) -> NDArray[np.uint8]:
