@@ -15,6 +15,8 @@ _FAST_THRESHOLDS = (20, 7)
 _EXCESS = 4
 _ENOUGH = 1.5
 _EDGE = 16
+_PATCH = 31
+"""OpenCV's size of a keypoint of the first level; the others' are larger by the level's scale."""
 _RADIUS_PER_SIZE = 1 / 6
 """Magnified by 3, a region is the square that ORB itself would describe."""
 
@@ -35,9 +37,9 @@ def detect_orb(
         if not found:
             continue
         table = np.array([(k.pt[0], k.pt[1], k.size, k.response) for k in found], np.float32)
-        frames = favour_large(
-            round_frames(table[:, :2], _RADIUS_PER_SIZE * table[:, 2], table[:, 3])
-        )
+        # OpenCV multiplies positions by the level's scale, but resizes about pixels' corners.
+        xy = (table[:, :2] + 0.5 * (table[:, 2:3] / _PATCH - 1.0)).astype(np.float32)
+        frames = favour_large(round_frames(xy, _RADIUS_PER_SIZE * table[:, 2], table[:, 3]))
         frames = take(frames, inside(frames, shape, usable))
         if len(frames) >= _ENOUGH * max_frames:
             break
