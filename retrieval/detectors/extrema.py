@@ -7,7 +7,7 @@ from retrieval.kernels import kernel
 
 _MAX_EDGE_RATIO = 10.0
 _EDGE_SCORE = (_MAX_EDGE_RATIO + 1.0) ** 2 / _MAX_EDGE_RATIO
-_MAX_MOVES = 5
+_MAX_FITS = 5
 
 
 @kernel
@@ -88,7 +88,7 @@ def _refine(
 ) -> bool:
     """Fit a quadratic; False if it runs away or the extremum is drawn out along an edge."""
     height, width = level.shape
-    for _ in range(_MAX_MOVES):
+    for _ in range(_MAX_FITS):
         dx = 0.5 * (level[row, column + 1] - level[row, column - 1])
         dy = 0.5 * (level[row + 1, column] - level[row - 1, column])
         ds = 0.5 * (above[row, column] - below[row, column])
