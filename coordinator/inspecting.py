@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from contracts.config import Detector, FeatureConfig, IndexConfig, SearchConfig
 from contracts.errors import UnusableImage, WrongInput
 from contracts.records import Frames
-from retrieval.detectors import detect
 from retrieval.pyramid import build_pyramid
+from retrieval.selection import mean_radius
 from survey import DecodedImage, decode_image, decode_mask
 from workers.stages.retrieve import Chosen, Configured, Photo, choose
 
@@ -69,14 +69,13 @@ def inspect_photo(path: Path, mask: Path | None, index: Configured) -> Inspectio
     """
     config = index.config.features
     decoded, usable = _decode(path, mask, config)
-    pyramid = build_pyramid(decoded.rgb)
+    photo = Photo(decoded, build_pyramid(decoded.rgb), config, usable)
     seen = []
     for detector in config.detectors:
         started = time.perf_counter()
-        frames = detect(pyramid, detector, config.frames_of(detector), usable)
+        frames = photo.frames(detector)
         seconds = time.perf_counter() - started
         seen.append(_measured(detector, frames, decoded, seconds))
-    photo = Photo(decoded, pyramid, config, {each.detector: each.frames for each in seen})
     return Inspection(path.name, decoded, usable, tuple(seen), choose(index, photo, SearchConfig()))
 
 
@@ -106,6 +105,6 @@ def _decode(
 
 def _measured(detector: Detector, frames: Frames, decoded: DecodedImage, seconds: float) -> Seen:
     height, width = decoded.rgb.shape[:2]
-    radii = np.sqrt(np.abs(np.linalg.det(frames.shape.astype(np.float64)))) * decoded.scale
-    median = float(np.median(radii)) if len(radii) else None
+    radii = mean_radius(frames.shape)
+    median = float(np.median(radii)) * decoded.scale if len(radii) else None
     return Seen(detector, frames, coverage(frames.xy, width, height), median, seconds)

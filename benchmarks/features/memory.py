@@ -9,6 +9,7 @@ from PIL import Image
 
 from benchmarks.table import print_table
 
+STATUS = Path("/proc/self/status")
 SIZE = (6000, 4000)
 FORMATS = {
     "JPEG": ("large.jpg", {"quality": 92}),
@@ -19,8 +20,8 @@ FORMATS = {
 }
 EXTRACT = """
 import sys
-from pathlib import Path
 import workers.tasks
+from benchmarks.features.memory import own_peak_mb
 from contracts.config import FeatureConfig
 from contracts.records import PosedImage
 from retrieval.features import compile_kernels
@@ -29,9 +30,7 @@ from workers.stages.extract import image_features
 compile_kernels()
 if sys.argv[1:]:
     image_features(PosedImage("large", sys.argv[1]), FeatureConfig())
-# Not ru_maxrss, which a process inherits from the one that starts it.
-status = Path("/proc/self/status").read_text().splitlines()
-print(next(int(line.split()[1]) // 1024 for line in status if line.startswith("VmHWM")))
+print(own_peak_mb())
 """
 
 
@@ -46,6 +45,12 @@ def run(data: Path) -> None:
             large.save(path, **options)
             rows.append((name, _peak_mb(str(path))))
     print_table((f"{SIZE[0]} x {SIZE[1]} pixels", "peak MB"), rows)
+
+
+def own_peak_mb() -> int:
+    """What this process has held at most; not ru_maxrss, which it inherits from its parent."""
+    lines = STATUS.read_text().splitlines()
+    return next(int(line.split()[1]) // 1024 for line in lines if line.startswith("VmHWM"))
 
 
 def _peak_mb(*photo: str) -> str:

@@ -21,7 +21,7 @@ from coordinator.cli.lists import (
     check_search,
     search_config,
 )
-from coordinator.cli.outputs import result_folder
+from coordinator.cli.outputs import result_folder, utf_8
 from coordinator.cli.show import bars, complain
 
 NAME = "evaluate"
@@ -65,12 +65,7 @@ def command(
     report = report_of(answers, opened, search)
     text = json.dumps(report, ensure_ascii=False, allow_nan=False)
     if out is not None:
-        write_whole(out / "report.json", _utf_8(text))
-        write_whole(out / "report.md", _utf_8(table_of(report)))
-    typer.echo(_utf_8(text if as_json else table_of(report)))
+        write_whole(out / "report.json", utf_8(text))
+        write_whole(out / "report.md", utf_8(table_of(report)))
+    typer.echo(utf_8(text if as_json else table_of(report)))
     return SOME_SKIPPED if report["unreadable"] else 0
-
-
-def _utf_8(text: str) -> bytes:
-    """UTF-8 in every locale; a byte of a name that is not UTF-8 as its (JSON) escape."""
-    return text.encode("utf-8", "backslashreplace")

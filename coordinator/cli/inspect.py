@@ -11,7 +11,7 @@ from rich.table import Table
 from contracts.config import DETECTORS, FeatureConfig, IndexConfig
 from contracts.errors import BadConfig
 from coordinator.cli.lists import MaxFrames, frame_limits, names_among
-from coordinator.cli.outputs import result_file
+from coordinator.cli.outputs import result_file, utf_8
 from coordinator.cli.show import stdout, tell
 
 if TYPE_CHECKING:  # drawing and detecting are imported when the verb runs
@@ -68,7 +68,7 @@ def command(
     write_whole(target, picture(inspection, suffix))
     if as_json:
         report = json.dumps(_report(photo, inspection), ensure_ascii=False, allow_nan=False)
-        typer.echo(report.encode("utf-8", "backslashreplace"))
+        typer.echo(utf_8(report))
     else:
         stdout.print(_table(inspection))
         chosen = inspection.chosen

@@ -1,9 +1,14 @@
-"""Where results go: looked at before the work, so that none is lost for want of a place."""
+"""How results are written, and where: looked at before the work, so that none is lost."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
 from contracts.errors import WrongInput
+
+
+def utf_8(text: str) -> bytes:
+    """UTF-8 in every locale; a byte of a name that is not UTF-8 as its (JSON) escape."""
+    return text.encode("utf-8", "backslashreplace")
 
 
 def result_file(out: Path, inputs: Iterable[Path] = ()) -> Path:

@@ -7,7 +7,6 @@ import shlex
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
@@ -15,6 +14,7 @@ from pathlib import Path
 import kombu
 import psutil
 import pytest
+from flaneur_command import FLANEUR
 from typer.testing import CliRunner
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
@@ -28,7 +28,6 @@ from coordinator.querying import locate_photos
 from index.opened import OpenedIndex
 from survey import ReadOptions
 
-FLANEUR = (sys.executable, "-m", "coordinator.cli")
 PAIR = SearchConfig(pair=("hesaff",), k=2, descriptors=("sift",), vote="intersection")
 CONFIG = IndexConfig(
     features=FeatureConfig(detectors=("hesaff",), descriptors=("sift",), max_frames=120),

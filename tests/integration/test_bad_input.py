@@ -7,13 +7,12 @@ for speed; whatever starts workers, or is stopped, runs in a process of its own.
 import json
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from bad_survey import INDEXED, SAME_IN_NFC, SKIPPED, fill, picture
+from flaneur_command import run
 from typer.testing import CliRunner
 
 from contracts.config import SearchConfig
@@ -23,21 +22,8 @@ from coordinator.querying import locate_photos
 from index.opened import OpenedIndex
 from survey import ReadOptions, read_survey
 
-FLANEUR = (sys.executable, "-m", "coordinator.cli")
 SMALL = ("--crs", "EPSG:2154", "--max-frames", "120", "--max-words", "200")
 QUICK = (*SMALL, "--detectors", "star", "--descriptors", "sift", "--workers", "1")
-
-
-def run(*arguments: str | Path, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*FLANEUR, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
-    )
 
 
 def say(*arguments: str | Path) -> tuple[int, str]:

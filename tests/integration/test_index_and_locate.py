@@ -2,15 +2,14 @@
 
 import hashlib
 import json
-import os
 import signal
 import subprocess
-import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from flaneur_command import FLANEUR, run
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.cli.show import Bars
@@ -25,7 +24,6 @@ CONFIG = IndexConfig(
     features=FeatureConfig(max_frames=120), codebooks=CodebookConfig(max_words=200)
 )
 LAMBERT_93 = ReadOptions(crs="EPSG:2154")
-FLANEUR = (sys.executable, "-m", "coordinator.cli")
 
 
 def index(survey: Path, root: Path, engine: Engine, shard_size: int = 4) -> IndexReport:
@@ -107,17 +105,6 @@ def test_one_unreadable_photo_stops_no_other(
     located = locate_photos(opened, photos, SearchConfig(), engine.follower, lambda: None)
     assert [answer.error is not None for answer in located] == [True, True, False]
     assert located[2].of_kind("match")[0]["properties"]["image"] == "03.jpg"
-
-
-def run(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*FLANEUR, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        env={**os.environ, **environment},
-    )
 
 
 INDEX_OPTIONS = ("--crs", "EPSG:2154", "--max-frames", "120", "--max-words", "200")

@@ -1,11 +1,9 @@
 """All channels of a photo together, on drawn and on real photos."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -19,7 +17,6 @@ from retrieval.pyramid import build_pyramid
 from survey import decode_image
 
 ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("FLANEUR_TEST_DATA", ROOT.parent / "shared" / "data"))
 
 
 def test_every_channel_is_described_frame_by_frame() -> None:
@@ -119,15 +116,6 @@ def test_every_old_photograph_has_frames_of_most_detectors(test_data: Path) -> N
         assert sum(number >= 300 for number in found) >= 4, (photo.name, found)
 
 
-def _photo(name: str) -> NDArray[np.uint8]:
-    path = DATA / "kth-buildings" / name
-    if not path.exists():
-        pytest.skip(f"{path} is missing; set FLANEUR_TEST_DATA to the folder of real images")
-    bgr = cv2.imread(str(path))
-    assert bgr is not None
-    return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)
-
-
 def _ratio_matches(query: NDArray[np.uint8], reference: NDArray[np.uint8]) -> int:
     a, b = query.astype(np.float64), reference.astype(np.float64)
     squared = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
@@ -136,9 +124,9 @@ def _ratio_matches(query: NDArray[np.uint8], reference: NDArray[np.uint8]) -> in
 
 
 @pytest.fixture(scope="module")
-def facades() -> tuple[Features, Features, Features]:
+def facades(test_data: Path) -> tuple[Features, Features, Features]:
     names = ("queries/obj10_t1.jpg", "references/obj10_1.jpg", "references/obj20_1.jpg")
-    photos = [_photo(name) for name in names]
+    photos = [decode_image(test_data / "kth-buildings" / name).rgb for name in names]
     query, same, other = (extract(photo, None, FeatureConfig()) for photo in photos)
     return query, same, other
 

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-ROOT = Path(__file__).parents[2]
-STATUS = Path("/proc/self/status")
+from benchmarks.features.memory import STATUS
 
-_EXTRACT = f"""
-STATUS = "{STATUS}"
+ROOT = Path(__file__).parents[2]
+
+_EXTRACT = """
 import sys
-from pathlib import Path
 import workers.tasks
+from benchmarks.features.memory import own_peak_mb
 from contracts.config import FeatureConfig
 from contracts.records import PosedImage
 from retrieval.features import compile_kernels
@@ -26,10 +26,8 @@ compile_kernels()
 decoded, features = image_features(PosedImage("large", sys.argv[1]), FeatureConfig())
 assert (decoded.width_px, decoded.height_px) == (6000, 4000), decoded
 assert sum(map(len, features.frames.values())) > 1000
-assert not {{"geopandas", "sklearn", "pandas"}} & set(sys.modules)
-# Not ru_maxrss, which a process inherits from the one that starts it.
-(peak,) = [line for line in Path(STATUS).read_text().splitlines() if line.startswith("VmHWM")]
-print(int(peak.split()[1]) // 1024)
+assert not {"geopandas", "sklearn", "pandas"} & set(sys.modules)
+print(own_peak_mb())
 """
 
 

@@ -58,19 +58,21 @@ def open_index(root: str, generation: int) -> OpenedIndex:
 class Photo:
     """A query photo: what was decoded, and the frames of the detectors that were asked for.
 
+    usable : (h, w) bool of the decoded photo, True = scenery; None = all of it.
     found : frames by detector; the others are found when they are first asked for.
     """
 
     decoded: DecodedImage
     pyramid: Pyramid
     config: FeatureConfig
+    usable: NDArray[np.bool_] | None = None
     found: dict[Detector, Frames] = field(default_factory=dict)
 
     def frames(self, detector: Detector) -> Frames:
         """The frames of one detector, as the index's images have them."""
         if detector not in self.found:
             limit = self.config.frames_of(detector)
-            self.found[detector] = detect(self.pyramid, detector, limit)
+            self.found[detector] = detect(self.pyramid, detector, limit, self.usable)
         return self.found[detector]
 
     def complementarity(
