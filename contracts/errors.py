@@ -4,7 +4,7 @@ FlaneurError
 ├── WrongInput               the user can mend it: exit 2
 │   ├── BadSurvey            not a survey, empty, or its metadata does not hold
 │   ├── UnknownCrs           a coordinate system is missing, unknown or cannot be converted
-│   ├── BadTruth             a ground truth names no image, or several
+│   ├── BadTruth             a ground truth of no known format, or its names do not hold
 │   ├── BadConfig            an option or a combination of options makes no sense
 │   └── BadIndex             not an index, a future format, or a damaged one
 ├── VocabularyMismatch       postings or words of different codebooks were put together: exit 1
@@ -31,7 +31,7 @@ class UnknownCrs(WrongInput):
 
 
 class BadTruth(WrongInput):
-    """A ground truth file names no indexed image, or several."""
+    """A ground truth of no known format, or one that names no indexed image, or several."""
 
 
 class BadConfig(WrongInput):

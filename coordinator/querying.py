@@ -86,11 +86,7 @@ def judge_queries(
 ) -> list[Json]:
     """Have every query searched and its ranking judged; in the order given."""
     orders = (
-        Order(
-            "judge",
-            str(number),
-            {**_message(index, each.query, each.path, search), "relevant": each.relevant},
-        )
+        Order("judge", str(number), _judged_message(index, each, search))
         for number, each in enumerate(queries)
     )
     return _in_order(follower, orders, advance)
@@ -110,12 +106,7 @@ def rehearse_queries(
         Order(
             "rehearse",
             str(number),
-            {
-                **_message(index, each.query, each.path, search),
-                "relevant": each.relevant,
-                "pairs": pairs,
-                "ks": list(ks),
-            },
+            {**_judged_message(index, each, search), "pairs": pairs, "ks": list(ks)},
         )
         for number, each in enumerate(queries)
     )
@@ -135,6 +126,15 @@ def _in_order(
         answers[int(outcome.order.key)] = outcome.value
         advance()
     return [answers[number] for number in sorted(answers)]
+
+
+def _judged_message(index: OpenedIndex, query: JudgedQuery, search: SearchConfig) -> Json:
+    return {
+        **_message(index, query.query, query.path, search),
+        "relevant": query.relevant,
+        "junk": query.junk,
+        "box": query.box,
+    }
 
 
 def _message(index: OpenedIndex, query: str, path: Path, search: SearchConfig) -> Json:

@@ -52,6 +52,14 @@ class OpenedIndex:
     def catalogue(self) -> Catalogue:
         return Catalogue(self.root / "catalogue" / f"{self.generation.segment}.parquet")
 
+    @cached_property
+    def images_by_sha256(self) -> dict[str, tuple[int, ...]]:
+        """Ids of the images whose file has this digest, ascending."""
+        found: dict[str, tuple[int, ...]] = {}
+        for image_id, sha256 in enumerate(self.catalogue.column("sha256")):
+            found[sha256] = (*found.get(sha256, ()), image_id)
+        return found
+
     def searcher(self, channel: str) -> WordSearcher:
         """The nearest-word search of a channel."""
         if channel not in self._searchers:

@@ -65,11 +65,17 @@ def average_precision(
 ) -> float:
     """AP as the Oxford and Paris buildings protocol computes it (Philbin et al., CVPR 2007).
 
-    The sum of (R_j - R_(j-1)) (P_j + P_(j-1)) / 2 with P_0 = 1, over the ranking without junk.
+    The sum of (R_j - R_(j-1)) (P_j + P_(j-1)) / 2 with R_0 = 0 and P_0 = 1 over the ranking
+    without junk, as their compute_ap.cpp has it. R_j = hits among the first j / all relevant
+    images, ranked or not: where one is missing from the ranking R never reaches 1, and the area
+    to the right of the last hit is 0. Between hits R stands still and nothing is added.
+
+    Departures: the program divides by all images of the good and ok lists, here one that is
+    also junk counts as junk only; and without a relevant image it divides by 0.
 
     Parameters
     ----------
-    ranking : image ids, best first; a relevant image missing from it counts as never found.
+    ranking : image ids, best first, each once; ties are settled by who ranks.
     relevant : image ids that answer the query; one that is also junk does not.
     junk : image ids taken out of the ranking: neither right nor wrong.
 

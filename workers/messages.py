@@ -67,9 +67,16 @@ class LocateMessage(Message):
 
 
 class JudgeMessage(LocateMessage):
-    """`relevant` : ids of the images that show the query's place."""
+    """`relevant` : ids of the images that show the query's place.
+
+    junk : ids that are neither right nor wrong.
+    box : x1 y1 x2 y2, pixels of the upright photo in its original size, from its upper left
+        corner; only frames whose centre lies in it are searched with. None: all of them.
+    """
 
     relevant: tuple[int, ...]
+    junk: tuple[int, ...] = ()
+    box: tuple[float, float, float, float] | None = None
 
 
 class RehearseMessage(JudgeMessage):

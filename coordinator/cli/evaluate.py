@@ -53,7 +53,8 @@ def command(
     opened = OpenedIndex(index.absolute())
     check_search(search, opened.config.features)
     out = None if out is None else result_folder(out)
-    queries = read_truth(truth, root, opened.catalogue.column("uri"))
+    catalogue = opened.catalogue
+    queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
         progress.begin("evaluate", len(queries), 0)
         answers = judge_queries(

@@ -32,9 +32,19 @@ Workers = Annotated[
     int | None, typer.Option(min=1, help="Local worker processes; default: one a core.")
 ]
 IndexFolder = Annotated[Path, typer.Option("--index", help="The index to search.")]
-Truth = Annotated[Path, typer.Option(help="JSON: query path -> relevant references.")]
+Truth = Annotated[
+    Path,
+    typer.Option(
+        help="JSON: query path -> relevant references; or a folder of Oxford/Paris lists; or an "
+        "INRIA Holidays list."
+    ),
+]
 TruthRoot = Annotated[
-    Path | None, typer.Option(help="Folder of the queries; default: the truth file's.")
+    Path | None,
+    typer.Option(
+        help="Folder of the queries; default: the truth file's, or for Oxford/Paris and Holidays "
+        "the index's own images."
+    ),
 ]
 Pair = Annotated[
     str, typer.Option(help="auto, two detectors such as hesaff,star, or one.", show_default=True)

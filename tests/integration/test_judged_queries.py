@@ -1,0 +1,125 @@
+"""From a ground truth on disk to judged rankings, through real workers."""
+
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from coordinator.cli.show import Bars
+from coordinator.engine import Engine
+from coordinator.indexing import run_job
+from coordinator.plan import make_plan, read_surveys
+from coordinator.querying import Json, judge_queries, rehearse_queries
+from coordinator.truth import read_truth
+from index.opened import OpenedIndex
+from survey import ReadOptions
+
+CONFIG = IndexConfig(
+    features=FeatureConfig(detectors=("hesaff", "mser"), max_frames=200),
+    codebooks=CodebookConfig(max_words=300),
+)
+SEARCH = SearchConfig(pair=("hesaff", "mser"), k=2)
+ALL = [f"{number:02d}" for number in range(10)]
+
+
+@pytest.fixture(scope="module")
+def opened(
+    small_survey: Path, tmp_path_factory: pytest.TempPathFactory, engine: Engine
+) -> OpenedIndex:
+    root = tmp_path_factory.mktemp("judged")
+    intake = read_surveys([("", small_survey)], ReadOptions(crs="EPSG:2154"))
+    job, plan = make_plan(root, intake, CONFIG, 4)
+    run_job(job, plan, intake, nullcontext(engine), Bars(None))
+    return OpenedIndex(root)
+
+
+def write_truth(folder: Path, query: str, good: list[str], junk: list[str]) -> Path:
+    """One Oxford query; `query` is the line of its query file."""
+    folder.mkdir(exist_ok=True)
+    contents = {"query": query, "good": "\n".join(good), "ok": "", "junk": "\n".join(junk)}
+    for kind, content in contents.items():
+        (folder / f"place_1_{kind}.txt").write_text(content)
+    return folder
+
+
+def judged(truth: Path, root: Path | None, opened: OpenedIndex, engine: Engine) -> Json:
+    queries = read_truth(
+        truth, root, opened.catalogue.column("uri"), opened.catalogue.column("path")
+    )
+    (answer,) = judge_queries(opened, queries, SEARCH, engine.follower, lambda: None)
+    return answer
+
+
+@pytest.fixture(scope="module")
+def two_places(small_survey: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A photo of 3840 x 1440, stored upside down, whose left half is image 03, right half 07."""
+    halves = [np.asarray(Image.open(small_survey / f"{name}.jpg")) for name in ("03", "07")]
+    wide = Image.fromarray(np.hstack(halves)).resize((3840, 1440), Image.Resampling.BICUBIC)
+    exif = Image.Exif()
+    exif[0x0112] = 3  # orientation: turn by 180 degrees
+    folder = tmp_path_factory.mktemp("photos")
+    wide.rotate(180).save(folder / "both.jpg", exif=exif, quality=92)
+    return folder
+
+
+@pytest.mark.parametrize(("box", "found"), [("0 0 1920 1440", "03"), ("1920 0 3840 1440", "07")])
+def test_only_the_box_of_the_upright_original_is_searched_for(
+    tmp_path: Path, two_places: Path, opened: OpenedIndex, engine: Engine, box: str, found: str
+) -> None:
+    (other,) = {"03", "07"} - {found}
+    right = write_truth(tmp_path / "right", f"both {box}", [found], [])
+    wrong = write_truth(tmp_path / "wrong", f"both {box}", [other], [])
+    assert judged(right, two_places, opened, engine)["first_hit_rank"] == 1
+    assert judged(wrong, two_places, opened, engine)["first_hit_rank"] > 2
+
+
+def test_a_box_around_the_whole_photo_hides_nothing(
+    tmp_path: Path, two_places: Path, opened: OpenedIndex, engine: Engine
+) -> None:
+    truth = write_truth(tmp_path / "whole", "both 0 0 3840 1440", ["03", "07"], [])
+    assert judged(truth, two_places, opened, engine)["ap"] == 1.0
+
+
+def test_a_box_outside_the_photo_is_that_querys_error(
+    tmp_path: Path, two_places: Path, opened: OpenedIndex, engine: Engine
+) -> None:
+    truth = write_truth(tmp_path / "outside", "both 3840 0 4000 1440", ["03"], [])
+    queries = read_truth(truth, two_places, opened.catalogue.column("uri"))
+    for answer in (
+        judged(truth, two_places, opened, engine),
+        *rehearse_queries(opened, queries, SEARCH, [2], engine.follower, lambda: None),
+    ):
+        assert answer["query"] == "place_1"
+        assert (
+            "box 3840 0 4000 1440 holds no pixel of the photo, which is 3840 x 1440"
+            in (answer["error"])
+        )
+
+
+def test_junk_and_the_query_itself_are_neither_right_nor_wrong(
+    tmp_path: Path, opened: OpenedIndex, engine: Engine
+) -> None:
+    query = "oxc1_03 0 0 320 240"
+    others = [name for name in ALL if name not in ("03", "08")]
+    all_junk = write_truth(tmp_path / "junk", query, ["03", "08"], others)
+    answer = judged(all_junk, None, opened, engine)
+    assert (answer["ap"], answer["first_hit_rank"], answer["n_relevant"]) == (1.0, 1, 1)
+    itself = write_truth(tmp_path / "itself", query, ["03"], [])
+    assert judged(itself, None, opened, engine) == {"query": "place_1", "excluded": True}
+
+
+def test_a_copy_of_an_indexed_image_does_not_find_itself(
+    tmp_path: Path, small_survey: Path, opened: OpenedIndex, engine: Engine
+) -> None:
+    (tmp_path / "copy.jpg").write_bytes((small_survey / "03.jpg").read_bytes())
+    truth = tmp_path / "truth.json"
+    truth.write_text('{"copy.jpg": ["03.jpg"]}')
+    assert judged(truth, None, opened, engine) == {"query": "copy.jpg", "excluded": True}
+
+
+def test_images_are_found_by_the_digest_of_their_file(opened: OpenedIndex) -> None:
+    digests = opened.catalogue.column("sha256")
+    assert opened.images_by_sha256 == {digest: (n,) for n, digest in enumerate(digests)}
