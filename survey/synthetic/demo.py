@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from datetime import datetime, timedelta, timezone
+from itertools import groupby
 from pathlib import Path
 
 import cv2
@@ -121,12 +122,18 @@ def _pictures(
     for index, shot in enumerate(shots):
         rng = np.random.default_rng([seed, 6, index])
         yield survey / shot.uri, _expose(render(town, shot.view), shot.wear, rng)
-    for index, visited in enumerate(visits):
-        rgb = render(town, visited.view, sky=1, cars=False)
-        styled = restyle(rgb, visited.style, seed + index)
-        if visited.style == "sepia" and index % 8 == 0:
-            styled = postcard(styled, visited.caption)
-        yield queries / visited.file, styled
+    for number, photos in groupby(visits, key=lambda visited: visited.number):
+        alike = tuple(photos)
+        rgb = render(town, alike[0].view, sky=1, cars=False)
+        for visited in alike:
+            yield queries / visited.file, _aged(rgb, visited, seed + number - 1)
+
+
+def _aged(rgb: Rgb, visited: QueryShot, seed: int) -> Rgb:
+    """A query's view in its style; some of the sepia ones are postcards."""
+    styled = restyle(rgb, visited.style, seed)
+    is_card = visited.style == "sepia" and visited.number % 8 == 1
+    return postcard(styled, visited.caption) if is_card else styled
 
 
 def _expose(rgb: Rgb, wear: str, rng: np.random.Generator) -> Rgb:

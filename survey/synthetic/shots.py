@@ -27,6 +27,9 @@ class ShotOptions:
     front_every: int = 6
     hfov_deg: float = 82.0
     n_queries: int = 24
+    """Views of queries; each is one photo, or one a style with `every_style`."""
+    every_style: bool = False
+    """Restyle each query view in every style; otherwise styles are dealt evenly."""
     worn_share: float = 0.12
     """Share of survey pictures that are blurred or dark."""
     max_stops: int | None = None
@@ -44,9 +47,13 @@ class SurveyShot:
 
 @dataclass(frozen=True, slots=True)
 class QueryShot:
-    """One old photograph, of one facade, with the style it was made in."""
+    """One old photograph, of one facade, with the style it was made in.
+
+    number : of its view, from 1; photos that differ in style only share it.
+    """
 
     file: str
+    number: int
     view: View
     facade: Facade
     style: str
@@ -90,16 +97,18 @@ def drive(plan: StreetPlan, options: ShotOptions, seed: int) -> tuple[SurveyShot
 
 
 def visit(town: Town, options: ShotOptions, seed: int) -> tuple[QueryShot, ...]:
-    """The queries: different facades, every template's turn, styles dealt evenly.
+    """The queries: different facades, every template's turn, styles dealt evenly or all of them.
 
-    Each photographer stands on the pavement across the street or nearer, off the survey's track,
-    at another height, focal length and angle.
+    `every_style` takes the same views and only adds photos. Each photographer stands on the
+    pavement across the street or nearer, off the survey's track, at another height, focal length
+    and angle.
     """
     rng = np.random.default_rng([seed, 5])
     pool = [town.houses[index].facade for index in rng.permutation(len(town.houses))]
     used: dict[str, int] = {}
     shots: list[QueryShot] = []
-    while len(shots) < options.n_queries:
+    number = 1
+    while number <= options.n_queries:
         rarest = min(used.get(facade.template.name, 0) for facade in pool)
         facade = next(f for f in pool if used.get(f.template.name, 0) == rarest)
         pool.remove(facade)
@@ -107,10 +116,14 @@ def visit(town: Town, options: ShotOptions, seed: int) -> tuple[QueryShot, ...]:
         if not _shows(town, view, facade):
             continue
         used[facade.template.name] = rarest + 1
-        style = STYLES[len(shots) % len(STYLES)]
+        dealt = STYLES[(number - 1) % len(STYLES)]
         title = facade.name.rpartition("-")[0].replace("-", " ").capitalize()
-        caption = f"{len(shots) * 7 + 3}. - {title}"
-        shots.append(QueryShot(f"q{len(shots) + 1:02d}-{style}.jpg", view, facade, style, caption))
+        caption = f"{number * 7 - 4}. - {title}"
+        shots += [
+            QueryShot(f"q{number:02d}-{style}.jpg", number, view, facade, style, caption)
+            for style in (STYLES if options.every_style else (dealt,))
+        ]
+        number += 1
     return tuple(shots)
 
 

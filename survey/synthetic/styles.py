@@ -10,23 +10,27 @@ from contracts.errors import BadConfig
 from survey.synthetic.canvas import Rgb
 from survey.synthetic.materials import noise
 
-# How hard each style is; larger is harder.
-SEPIA_BLUR_PX = 0.7
-SEPIA_CONTRAST = 0.75
-SEPIA_GRAIN = 11.0
-SEPIA_GRAIN_PX = 1.0
-SEPIA_PLATE = (0.2, 0.45, 0.35)
-HALFTONE_CELL_PX = 3.7
-HALFTONE_DEPTH = 0.62
-HALFTONE_SCAN_BLUR_PX = 1.0
-ENGRAVING_PITCH_PX = 3.6
-ENGRAVING_DEPTH = 0.66
-ENGRAVING_WASH = 0.63
+# How hard each style is; larger is harder, except for contrast and light.
+SEPIA_BLUR_PX = 0.9
+SEPIA_CONTRAST = 0.65
+SEPIA_FADING = 0.5
+SEPIA_GRAIN = 12.0
+SEPIA_GRAIN_PX = 1.3
+SEPIA_STAINS = 0.25
+SEPIA_PLATE = (0.05, 0.3, 0.65)
+HALFTONE_CELL_PX = 5.0
+HALFTONE_DEPTH = 0.8
+HALFTONE_SCAN_BLUR_PX = 1.1
+ENGRAVING_PITCH_PX = 5.0
+ENGRAVING_DEPTH = 0.75
+ENGRAVING_WASH = 0.45
 ENGRAVING_OUTLINE = 9.0
 ENGRAVING_SCAN_BLUR_PX = 0.95
-NIGHT_LIGHT = 0.55
-NIGHT_NOISE = 10.0
-NIGHT_LIT_SHARE = 0.3
+NIGHT_LIGHT = 0.34
+NIGHT_NOISE = 12.0
+NIGHT_BLUR_PX = 0.8
+NIGHT_LIT_SHARE = 0.4
+PAPER_WARP_PX = 2.5
 
 Plane = NDArray[np.float32]
 
@@ -50,7 +54,38 @@ def restyle(rgb: Rgb, style: str, seed: int) -> Rgb:
     """
     if style not in _MAKERS:
         raise BadConfig(f"style: no style is called {style!r}; there are {', '.join(STYLES)}")
-    return _MAKERS[style](rgb, np.random.default_rng([seed, STYLES.index(style)]))
+    rng = np.random.default_rng([seed, STYLES.index(style)])
+    return _MAKERS[style](rgb if style == "night" else _warped(rgb, rng), rng)
+
+
+def _warped(rgb: Rgb, rng: np.random.Generator) -> Rgb:
+    """Paper that does not lie quite flat: every point a little aside, its neighbours alike."""
+    rows, cols = np.mgrid[: rgb.shape[0], : rgb.shape[1]].astype(np.float32)
+    aside, down = (noise(rgb.shape[:2], 220, rng) * np.float32(PAPER_WARP_PX) for _ in range(2))
+    moved = cv2.remap(
+        rgb, cols + aside, rows + down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
+    )
+    return np.asarray(moved, dtype=np.uint8)
+
+
+def _faded(tone: Plane, rng: np.random.Generator) -> Plane:
+    """A print that paled from the light of one side, and unevenly."""
+    shape = tone.shape
+    rows = np.linspace(0, 1, shape[0], dtype=np.float32)[:, None]
+    cols = np.linspace(0, 1, shape[1], dtype=np.float32)[None]
+    lit = (rows if rng.random() < 0.5 else 1 - rows) * 0.8 + cols * np.float32(
+        rng.uniform(-0.2, 0.2)
+    )
+    lost = np.clip(lit + noise(shape, 150, rng) * 0.12, 0, 1) * np.float32(SEPIA_FADING)
+    return np.asarray(tone * (1 - lost) + 0.8 * lost, np.float32)
+
+
+def _stains(shape: tuple[int, int], rng: np.random.Generator) -> Plane:
+    """Light that damp and foxing take, 0 to 1: broad blotches with dark rims, and specks."""
+    broad = noise(shape, 130, rng)
+    rims = np.exp(-(((broad - 1.0) / 0.12) ** 2)) * 0.5 + np.clip(broad - 1.0, 0, 1) * 0.6
+    specks = np.clip(cv2.GaussianBlur(noise(shape, 9, rng), (0, 0), 2.5) - 1.0, 0, 1) * 1.2
+    return np.asarray(np.clip(rims + specks, 0, 1), np.float32)
 
 
 def _grey(rgb: Rgb) -> Plane:
@@ -81,9 +116,8 @@ def _sepia(rgb: Rgb, rng: np.random.Generator) -> Rgb:
     # Old plates see blue as bright and red as dark.
     plate = rgb.astype(np.float32) @ np.array(list(SEPIA_PLATE), np.float32) / 255
     blurred = cv2.GaussianBlur(plate, (0, 0), SEPIA_BLUR_PX)
-    tone = 0.5 + (blurred - 0.5) * SEPIA_CONTRAST + 0.16
-    tone = tone + noise(shape, 90, rng) * 0.03 + noise(shape, 250, rng) * 0.04
-    tone = tone * _vignette(shape, 0.35)
+    tone = _faded(0.5 + (blurred - 0.5) * SEPIA_CONTRAST + 0.1, rng)
+    tone = tone * _vignette(shape, 0.3) * (1 - SEPIA_STAINS * _stains(shape, rng))
     tone = tone + noise(shape, SEPIA_GRAIN_PX, rng) * np.float32(SEPIA_GRAIN / 255)
     aged = _inked(np.asarray(1 - tone, dtype=np.float32), (252, 236, 202), (42, 24, 10))
     for _ in range(int(rng.integers(5, 12))):
@@ -154,6 +188,7 @@ def _engraving(rgb: Rgb, rng: np.random.Generator) -> Rgb:
 
 def _night(rgb: Rgb, rng: np.random.Generator) -> Rgb:
     shape = rgb.shape[:2]
+    rgb = _scanned(rgb, NIGHT_BLUR_PX)
     light = np.float32(NIGHT_LIGHT) * (1 + 0.25 * noise(shape, 300, rng))
     dark = rgb.astype(np.float32) * np.array([0.72, 0.84, 1.15], np.float32) * light[..., None]
     sky = (rgb[..., 2] > 170) & (rgb[..., 2].astype(np.int16) >= rgb[..., 0] - 4)

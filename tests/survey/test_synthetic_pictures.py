@@ -3,6 +3,7 @@
 import csv
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,23 @@ def test_the_truth_names_queries_that_exist_and_images_that_see_their_facade(
     assert [row["file"] for row in truth] == [query.file for query in demo.truth]
 
 
+def test_every_style_adds_photos_and_leaves_the_dealt_ones_as_they_are(
+    rendered: tuple[Path, DemoSurvey], tmp_path: Path
+) -> None:
+    folder, dealt = rendered
+    demo = render_survey(tmp_path, 3, options=replace(SMALL, every_style=True))
+    before, after = _digests(folder), _digests(tmp_path)
+    assert len(demo.truth) == len(STYLES) * SMALL.n_queries
+    assert set(dealt.truth) < set(demo.truth)
+    assert {name for name in after if name.endswith(".jpg")} - set(before) == {
+        f"queries/{query.file}" for query in set(demo.truth) - set(dealt.truth)
+    }
+    for name in before:
+        assert name.endswith("truth.json") or before[name] == after[name]
+    relevant = json.loads((demo.queries / "ground_truth.json").read_text(encoding="utf-8"))
+    assert set(relevant) == {query.file for query in demo.truth}
+
+
 @pytest.fixture(scope="module")
 def photo(town: Town) -> np.ndarray:
     house = town.houses[4]
@@ -157,6 +175,19 @@ def test_night_is_dark_and_sepia_is_brown(photo: np.ndarray) -> None:
     assert restyle(photo, "night", 0).mean() < 0.75 * photo.mean()
     sepia = restyle(photo, "sepia", 0).reshape(-1, 3).mean(axis=0)
     assert sepia[0] > sepia[1] > sepia[2]
+
+
+def test_sepia_pales_towards_the_top_or_the_foot() -> None:
+    bars = np.zeros((320, 320, 3), dtype=np.uint8)
+    bars[:, np.arange(320) % 40 < 20] = 255
+    towards_foot = set()
+    for seed in range(6):
+        rows = restyle(bars, "sepia", seed)[..., 1].astype(float)
+        # Averaged down a strip, grain and scratches leave the bars alone.
+        top, foot = (strip.mean(axis=0).std() for strip in (rows[10:70], rows[-70:-10]))
+        assert max(top, foot) > 1.3 * min(top, foot)
+        towards_foot.add(top > foot)
+    assert towards_foot == {True, False}
 
 
 @pytest.mark.parametrize("style", STYLES)

@@ -158,3 +158,14 @@ def test_styles_are_dealt_evenly(queries: tuple[QueryShot, ...]) -> None:
     counts = Counter(query.style for query in queries)
     assert set(counts) == set(STYLES)
     assert max(counts.values()) - min(counts.values()) <= 1
+
+
+def test_every_style_takes_the_same_views_in_all_four_styles(
+    town: Town, queries: tuple[QueryShot, ...]
+) -> None:
+    shots = visit(town, ShotOptions(n_queries=3, every_style=True), 0)
+    names = [f"q{number:02d}-{style}.jpg" for number in (1, 2, 3) for style in STYLES]
+    assert [shot.file for shot in shots] == names
+    for shot in shots:
+        assert shot.view == queries[shot.number - 1].view
+        assert shot.facade is queries[shot.number - 1].facade
