@@ -4,16 +4,27 @@ import os
 import sys
 from pathlib import Path
 
-from benchmarks import default_model, features, kth, stereopolis, workers
+from benchmarks import complementarity, features, fusion, kth, pooled, stereopolis, workers
+from benchmarks.sets import run as sets
 
 FIGURES = {"stereopolis": stereopolis.run, "kth": kth.run, "workers": workers.run}
-BENCHMARKS = {**FIGURES, "features": features.run, "default-model": default_model.run}
+BENCHMARKS = {
+    **FIGURES,
+    "features": features.run,
+    "fusion": fusion.run,
+    "complementarity": complementarity.run,
+    "pooled": pooled.run,
+    "sets": sets.run,
+}
 
 
 def main() -> None:
     data = Path(os.environ.get("FLANEUR_TEST_DATA", Path(__file__).parents[2] / "shared" / "data"))
     if not data.is_dir():
         sys.exit(f"No real images at {data}; set FLANEUR_TEST_DATA.")
+    unknown = [name for name in sys.argv[1:] if name not in BENCHMARKS]
+    if unknown:
+        sys.exit(f"No benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}.")
     for name in sys.argv[1:] or FIGURES:
         print(f"\n## {name}\n")
         BENCHMARKS[name](data)

@@ -13,6 +13,12 @@ Detector = Literal["hesaff", "mser", "star", "har", "orb", "colsym"]
 Descriptor = Literal["sift", "surf", "sc"]
 Vote = Literal["union", "intersection", "pairwise"]
 Weight = Literal["idf", "norm", "burst"]
+DistanceScale = Literal["range", "percentile"]
+UnionDistance = Literal["sum", "mean"]
+VariantName = Literal[
+    "fixed", "eq1", "paper", "kp_only", "intercept", "offsets", "gain", "crowding", "look"
+]
+"""Forms of the regression that chooses detectors and k (retrieval/regression.py)."""
 North = Literal["grid", "true", "magnetic"]
 
 DETECTORS: tuple[Detector, ...] = ("hesaff", "mser", "star", "har", "orb", "colsym")
@@ -100,22 +106,28 @@ class SearchConfig(_Frozen):
     """How a photo is searched for (METHOD sections 3 and 4)."""
 
     pair: tuple[Detector, ...] | Literal["auto"] = "auto"
-    """One detector, two, or `auto`: the model chooses a pair."""
+    """One detector or more, each once, or `auto`: the model chooses a pair."""
     k: Annotated[int, Field(ge=1, le=MAX_NEIGHBOURS)] | Literal["auto"] = "auto"
     descriptors: tuple[Descriptor, ...] | None = None
     """None: all that the index has."""
-    vote: Vote = "intersection"
+    vote: Vote = "pairwise"
     weights: tuple[Weight, ...] = ("idf", "norm")
     top: Annotated[int, Field(ge=1, le=10_000)] = 10
     max_images: Annotated[int, Field(ge=1)] | None = None
     """The T of the multi-sequence walk (`union` only); None: T does not bind."""
+    distance_scale: DistanceScale = "range"
+    """What is d' = 1: the largest distance to the k-th word in the codebook's sample, or its
+    99th percentile, beyond which d' stays 1. For every vote."""
+    union_distance: UnionDistance = "sum"
+    """A cell of L words is as far as the sum of their d', so that a vote may be negative down to
+    1 - L, or as their mean (`union` only; the same for one descriptor)."""
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
-        if self.pair != "auto" and (
-            not 1 <= len(self.pair) <= 2 or len(set(self.pair)) != len(self.pair)
-        ):
-            raise ValueError(f"--pair takes one detector or two different ones; got {self.pair}")
-        if self.max_images is not None and self.vote != "union":
+        if self.pair != "auto" and (not self.pair or len(set(self.pair)) != len(self.pair)):
+            raise ValueError(f"--pair takes one to six different detectors; got {self.pair}")
+        if self.vote != "union" and self.max_images is not None:
             raise ValueError("max_images belongs to the vote `union`")
+        if self.vote != "union" and self.union_distance != "sum":
+            raise ValueError("union_distance belongs to the vote `union`")
         return self

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.engine import Engine
 from coordinator.export.files import write_geojson
 from coordinator.export.page import write_page
-from coordinator.export.sheets import QuerySheet, SheetMatch
+from coordinator.export.sheets import QuerySheet, SheetMatch, thumbnail_jpeg
 from coordinator.indexing import IndexReport, Progress, run_job
 from coordinator.plan import make_plan, read_surveys
 from coordinator.querying import Located, locate_photos
@@ -22,7 +21,7 @@ from geo.crs import ToWgs84
 from geo.frames import LocalMetres
 from geo.geojson import feature_collection
 from index.opened import OpenedIndex
-from survey import ReadOptions, decode_image
+from survey import ReadOptions
 from survey.synthetic import DemoQuery, DemoSurvey, ShotOptions, render_survey
 
 CONFIG = IndexConfig(
@@ -155,7 +154,7 @@ class _Judge:
         ]
         return QuerySheet(
             query=located.query,
-            photo_jpeg=_thumbnail(Path(located.query), THUMBNAIL_PX * 2),
+            photo_jpeg=thumbnail_jpeg(Path(located.query), THUMBNAIL_PX * 2, max_bytes=60_000),
             style=row.query.style,
             detectors=row.flaneur.detectors,
             k=row.flaneur.k,
@@ -164,7 +163,7 @@ class _Judge:
                     image=match["image"],
                     rank=match["rank"],
                     score=match["score"],
-                    thumbnail_jpeg=_thumbnail(Path(match["uri"]), THUMBNAIL_PX),
+                    thumbnail_jpeg=thumbnail_jpeg(Path(match["uri"]), THUMBNAIL_PX),
                     hit=self._sees(match["image"], row.query.facade),
                 )
                 for match in matches
@@ -190,12 +189,6 @@ class _Judge:
 
     def _sees(self, uri: str, facade: str) -> bool:
         return facade in self._demo.facades_seen.get(uri, ())
-
-
-def _thumbnail(path: Path, side_px: int) -> bytes:
-    rgb = decode_image(path, max_side_px=side_px).rgb
-    _, encoded = cv2.imencode(".jpg", rgb[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])
-    return bytes(encoded)
 
 
 def share_right(rows: Sequence[DemoRow], way: Callable[[DemoRow], Answer]) -> int:

@@ -13,7 +13,8 @@ from contracts.records import Frames
 from retrieval.pyramid import build_pyramid
 from retrieval.selection import mean_radius
 from survey import DecodedImage, decode_image, decode_mask
-from workers.stages.retrieve import Chosen, Configured, Photo, choose
+from workers.stages.choose import choose
+from workers.stages.retrieve import Chosen, Configured, Photo
 
 _GRID = 10
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from contracts.config import SearchConfig
+from contracts.config import SearchConfig, Vote, Weight
 from contracts.errors import TaskFailed
 from coordinator.follow import Follower, Order
 from coordinator.truth import JudgedQuery
@@ -13,6 +13,34 @@ from geo.geojson import Feature, Kind, error_feature
 from index.opened import OpenedIndex
 
 Json = dict[str, Any]
+
+WEIGHTINGS: tuple[tuple[Weight, ...], ...] = (
+    (),
+    ("idf",),
+    ("norm",),
+    ("idf", "norm"),
+    ("burst", "idf", "norm"),
+)
+"""Sets of weights that an evaluation compares."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """Rules of fusion to rehearse: every vote with every weighting."""
+
+    votes: tuple[Vote, ...]
+    weightings: tuple[tuple[Weight, ...], ...]
+
+    @classmethod
+    def of(cls, search: SearchConfig) -> "Rules":
+        """The rule of one search alone."""
+        return cls((search.vote,), (search.weights,))
+
+    @classmethod
+    def all_for(cls, n_descriptors: int) -> "Rules":
+        """Every vote that so many descriptors can give, with the weightings worth comparing."""
+        votes = tuple(vote for vote in get_args(Vote) if vote != "pairwise" or n_descriptors > 1)
+        return cls(votes, WEIGHTINGS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,21 +124,36 @@ def rehearse_queries(
     index: OpenedIndex,
     queries: Sequence[JudgedQuery],
     search: SearchConfig,
+    rules: Rules,
     ks: Sequence[int],
     follower: Follower,
     advance: Callable[[], None],
+    keep: Path | None = None,
 ) -> list[Json]:
-    """Have every query searched with every pair of detectors and every k; in the order given."""
-    pairs = index.config.features.pairs()
+    """Have every query answered in every way, by each of `rules`; in the order given.
+
+    keep : a folder for the votes of every query's single detectors, by its number.
+    """
     orders = (
         Order(
             "rehearse",
             str(number),
-            {**_judged_message(index, each, search), "pairs": pairs, "ks": list(ks)},
+            {
+                **_judged_message(index, each, search),
+                "votes": list(rules.votes),
+                "weightings": [list(each) for each in rules.weightings],
+                "ks": list(ks),
+                "keep": None if keep is None else str(votes_file(keep, number)),
+            },
         )
         for number, each in enumerate(queries)
     )
     return _in_order(follower, orders, advance)
+
+
+def votes_file(folder: Path, number: int) -> Path:
+    """Where the votes of a query are kept."""
+    return folder.absolute() / f"{number:06d}.npz"
 
 
 def _in_order(

@@ -3,11 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from contracts.config import SearchConfig
+import numpy as np
+
+from contracts.config import Detector, SearchConfig, VariantName
+from contracts.errors import WrongInput
 from coordinator.truth import JudgedQuery
 from index.opened import OpenedIndex
-from retrieval.choice import ChoiceModel, TrainingRow, TrainingSet, fit
-from retrieval.complementarity import Complementarity
+from retrieval.candidates import Candidate
+from retrieval.choice import ChoiceModel
+from retrieval.choice_fit import fit_choice
+from retrieval.regression import VARIANTS
+from retrieval.trials import Trials
 
 Json = dict[str, Any]
 
@@ -18,6 +24,7 @@ def train_model(
     index: OpenedIndex,
     search: SearchConfig,
     set_name: str,
+    variants: Sequence[VariantName] = tuple(VARIANTS),
 ) -> ChoiceModel:
     """Fit the choice on what rehearsing showed; unreadable queries are left out.
 
@@ -25,37 +32,58 @@ def train_model(
     ------
     WrongInput : fewer than two places are left.
     """
-    places = places_of(queries)
-    rows = training_rows(answers, places)
-    used = {row.query: row.place for row in rows}
-    return fit(
-        rows,
+    return fit_choice(
+        trials_of(answers, places_of(queries), [set_name] * len(answers)),
         detectors=index.config.features.detectors,
         descriptors=search.descriptors or index.config.features.descriptors,
         vote=search.vote,
-        weights=tuple(sorted(search.weights)),
-        trained_on=(
-            TrainingSet(
-                set=set_name, n_queries=max(len(used), 1), n_places=max(len(set(used.values())), 1)
-            ),
-        ),
+        weights=search.weights,
+        index_digest=index.generation.digest(),
+        variants=variants,
     )
 
 
-def training_rows(answers: Sequence[Json], places: Mapping[str, str]) -> list[TrainingRow]:
-    """One row per query, pair and k."""
-    return [
-        TrainingRow(
-            query=answer["query"],
-            place=places[answer["query"]],
-            pair=(row["pair"][0], row["pair"][1]),
-            k=row["k"],
-            features=Complementarity(**row["features"]),
-            ap=row["ap"],
+def trials_of(
+    answers: Sequence[Json],
+    places: Mapping[str, str],
+    sets: Sequence[str],
+) -> Trials:
+    """What every pair and k achieved on every query that could be judged.
+
+    sets : of all queries, in the order of `answers`.
+
+    Raises
+    ------
+    WrongInput : none could be judged.
+    """
+    judged = [answer for answer in answers if "together" in answer]
+    if not judged:
+        raise WrongInput(
+            f"none of {len(answers)} queries could be read and has a relevant image; check the "
+            "ground truth and its --root"
         )
-        for answer in answers
-        for row in answer.get("rows", ())
-    ]
+    candidates = tuple(_candidate(row) for row in judged[0]["features"])
+    if not candidates:
+        raise WrongInput(
+            "pairs of detectors are compared and the index has only one detector; index again "
+            "with two or more --detectors"
+        )
+    together = np.array([answer["together"] for answer in judged], dtype=np.float64)
+    return Trials(
+        queries=tuple(answer["query"] for answer in judged),
+        places=np.array([places[answer["query"]] for answer in judged]),
+        sets=np.array([name for name, a in zip(sets, answers, strict=True) if "together" in a]),
+        candidates=candidates,
+        ap=np.diagonal(together, axis1=1, axis2=2).copy(),
+        ap_together=together,
+        features=np.array([[row[3:] for row in answer["features"]] for answer in judged]),
+    )
+
+
+def _candidate(row: Sequence[Any]) -> Candidate:
+    first: Detector = row[0]
+    second: Detector = row[1]
+    return (first, second), int(row[2])
 
 
 def places_of(queries: Sequence[JudgedQuery]) -> dict[str, str]:

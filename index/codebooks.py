@@ -8,7 +8,9 @@ from pathlib import Path
 
 import faiss
 import numpy as np
+from numpy.typing import NDArray
 
+from contracts.config import MAX_NEIGHBOURS
 from contracts.errors import BadIndex
 from index.files import map_array, sha256_of, write_array, write_bytes
 from retrieval.codebooks import Codebook, WordSearcher, build_search
@@ -27,7 +29,11 @@ def codebook_paths(root: Path, segment: str, channel: str) -> dict[str, Path]:
 def write_codebook(paths: dict[str, Path], codebook: Codebook) -> dict[Path, str]:
     """Write a codebook and its search structure; returns path -> sha256."""
     structure: np.ndarray = faiss.serialize_index(build_search(codebook.words))
-    distances = {"dmin": codebook.dmin, "dmax": [float(value) for value in codebook.dmax]}
+    distances = {
+        "dmin": codebook.dmin,
+        "dmax": codebook.dmax.tolist(),
+        "d99": codebook.d99.tolist(),
+    }
     return {
         paths["words"]: write_array(paths["words"], codebook.words),
         paths["search"]: write_bytes(paths["search"], structure.tobytes()),
@@ -45,10 +51,12 @@ def read_searcher(paths: dict[str, Path], search_sha256: str) -> WordSearcher:
     words = map_array(paths["words"], np.uint8, 2)
     try:
         distances = json.loads(paths["distances"].read_bytes())
-        dmin, dmax = float(distances["dmin"]), np.array(distances["dmax"], dtype=np.float32)
+        dmin = float(distances["dmin"])
+        dmax, d99 = _of_each_k(distances["dmax"]), _of_each_k(distances["d99"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadIndex(
-            f"{paths['distances']} is damaged ({error}). Restore it or index again."
+            f"{paths['distances']} is damaged or of an older Flaneur ({error!r}). "
+            "Restore it or index again."
         ) from error
     if not paths["search"].is_file() or sha256_of(paths["search"]) != search_sha256:
         raise BadIndex(
@@ -56,4 +64,12 @@ def read_searcher(paths: dict[str, Path], search_sha256: str) -> WordSearcher:
             "Restore it or index again."
         )
     structure = faiss.deserialize_index(np.fromfile(paths["search"], dtype=np.uint8))
-    return WordSearcher(Codebook(words.astype(np.uint8, copy=False), dmin, dmax), structure)
+    codebook = Codebook(words.astype(np.uint8, copy=False), dmin, dmax, d99)
+    return WordSearcher(codebook, structure)
+
+
+def _of_each_k(values: list[float]) -> NDArray[np.float32]:
+    distances = np.array(values, dtype=np.float32)
+    if distances.shape != (MAX_NEIGHBOURS,):
+        raise ValueError(f"{distances.shape} distances, expected {MAX_NEIGHBOURS}")
+    return distances

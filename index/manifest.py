@@ -5,6 +5,7 @@ one or the new one, never a mixture; files of a generation are never changed onc
 """
 
 import fcntl
+import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -56,6 +57,11 @@ class Generation(BaseModel):
     segment: str
     """Name of the folder under segments/ and codebooks/, and stem of the catalogue."""
     files: dict[str, FileEntry]
+
+    def digest(self) -> str:
+        """First 16 hex digits of the SHA-256 of all of it, and so of every file it names."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def commit(root: Path, generation: Generation) -> None:

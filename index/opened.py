@@ -93,6 +93,14 @@ class OpenedIndex:
             total += map_array(path, np.uint32, 1).astype(np.int64)
         return total
 
+    def density(self, channels: Sequence[str]) -> float:
+        """Mean share of the images that a word of these channels is in."""
+        shares = []
+        for channel in channels:
+            postings = self.postings(channel)
+            shares.append(len(postings.image_ids) / max(postings.n_words * self.n_images, 1))
+        return sum(shares) / len(shares)
+
     def bytes_on_disk(self) -> int:
         return sum(entry.size for entry in self.generation.files.values())
 

@@ -1,25 +1,40 @@
 """The adaptive choice: which pair of detectors, and which k, a photo is searched with."""
 
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal, get_args
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, ValidationError
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from contracts.config import Descriptor, Detector, Vote, Weight
+from contracts.config import MAX_NEIGHBOURS, Descriptor, Detector, VariantName, Vote, Weight
 from contracts.errors import BadIndex, WrongInput
-from retrieval.complementarity import Complementarity
-from retrieval.regression import (
-    Choice,
-    Fitted,
-    Pair,
-    Record,
-    TrainingRow,
-    Variant,
-    fit_equations,
-)
+from retrieval.candidates import FEATURES, Candidate, Pair
+from retrieval.regression import VARIANTS, Column, Regression, columns, used_features
 
-__all__ = ["Choice", "ChoiceModel", "LeftOutScores", "Pair", "TrainingRow", "TrainingSet", "fit"]
+N_JOINED: tuple[Literal[1, 2], ...] = (1, 2)
+"""How many rankings, of pairs of one k, are joined."""
+
+K = Annotated[int, Field(ge=1, le=MAX_NEIGHBOURS)]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What a photo is to be searched with, what is expected of it, and why.
+
+    pairs : one, or two whose rankings are joined.
+    """
+
+    pairs: tuple[Pair, ...]
+    k: int
+    predicted_map: float
+    reason: str
+
+
+class Record(BaseModel):
+    """A part of a model's JSON: no unknown key, no wrong type, no infinity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class TrainingSet(Record):
@@ -30,31 +45,94 @@ class TrainingSet(Record):
     n_places: Annotated[int, Field(ge=1)]
 
 
-class LeftOutScores(Record):
-    """Mean AP over queries, each chosen for by a fit without its place.
+class Range(Record):
+    """A mean and its bootstrap 95 % interval; None where it cannot be told."""
 
-    best_fixed : the pair and k that are best on the other places. oracle : the best pair and k
-    of each query, by hindsight. random : the mean over all pairs and k.
+    mean: float
+    low: float | None
+    high: float | None
+
+
+class LeftOutScores(Record):
+    """Mean AP on places left out of the fit.
+
+    The variant, too, is picked on the other places: the score of the one that turned out best
+    would flatter it.
+    gain : of adaptive over best_fixed, the pair and k best on the other places; share : of the
+    room between that and the oracle; random : the mean over all pairs and k.
     """
 
-    adaptive: float
+    adaptive: Range
+    gain: Range
+    share: Range
     best_fixed: float
-    oracle: float
+    worst_fixed: float
     random: float
+    oracle: float
+    n_chosen: int
+
+
+class Coefficient(Record):
+    """One coefficient and its bootstrap interval: of a term, for one k or pair or for all."""
+
+    term: str
+    k: K | None
+    pair: Pair | None
+    value: float
+    low: float
+    high: float
+
+    def column(self) -> Column:
+        return Column(self.term, self.k, self.pair)
+
+
+class TermRange(Record):
+    """Lowest and highest value of a feature in training, as the variant sees it."""
+
+    term: str
+    low: float
+    high: float
+
+
+class FixedScore(Record):
+    """Mean AP over the training queries of one pair and k for all of them."""
+
+    pair: Pair
+    k: K
+    mean_ap: float
 
 
 class ChoiceModel(Record):
-    """A fitted choice, the search it was trained for, and what it proved to be worth."""
+    """A fitted choice, the search it was trained for, and what it proved to be worth.
+
+    fixed : every candidate, best first. level : see `Regression`. index_digest : of the one index
+    it was trained on; None: of several.
+    """
 
     form: Literal[1] = 1
-    variant: Variant
+    variant: VariantName
+    n_joined: Literal[1, 2]
     detectors: tuple[Detector, ...]
     descriptors: tuple[Descriptor, ...]
     vote: Vote
     weights: tuple[Weight, ...]
-    fitted: Fitted
+    coefficients: Annotated[tuple[Coefficient, ...], Field(min_length=1)]
+    level: float
+    ranges: tuple[TermRange, ...]
+    fixed: Annotated[tuple[FixedScore, ...], Field(min_length=1)]
     left_out: LeftOutScores
-    trained_on: tuple[TrainingSet, ...]
+    trained_on: Annotated[tuple[TrainingSet, ...], Field(min_length=1)]
+    index_digest: str | None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        variant = VARIANTS[self.variant]
+        wanted = columns(variant, self.candidates())
+        if [each.column() for each in self.coefficients] != wanted:
+            raise ValueError(f"coefficients are not those of the variant {self.variant}")
+        if tuple(each.term for each in self.ranges) != variant.terms:
+            raise ValueError(f"ranges are not of the terms of the variant {self.variant}")
+        return self
 
     def to_json(self) -> str:
         """Write all of it; `from_json` reads it back equal."""
@@ -78,123 +156,128 @@ class ChoiceModel(Record):
                 "Restore it or run `flaneur train` again."
             ) from error
 
-    @property
-    def is_worth_using(self) -> bool:
-        """Whether choosing did better than one fixed pair on places left out."""
-        return self.left_out.adaptive > self.left_out.best_fixed
+    def candidates(self) -> tuple[Candidate, ...]:
+        """Every pair and k that can be chosen, in the order of their features."""
+        known = {(each.pair, each.k) for each in self.fixed}
+        return tuple(sorted(known, key=lambda each: (each[1], [*map(self._place, each[0])])))
+
+    def _place(self, detector: Detector) -> int:
+        return self.detectors.index(detector)
 
     @property
-    def ks(self) -> tuple[int, ...]:
-        """Every k that can be chosen, ascending."""
-        return tuple(equation.k for equation in self.fitted.equations)
+    def needs_look(self) -> bool:
+        """Whether a photo must be searched with every candidate before one is chosen."""
+        return VARIANTS[self.variant].needs_look
 
-    @property
-    def fallback_pair(self) -> Pair:
-        """The pair of the best fixed choice."""
-        return self.fitted.fixed[0].pair
+    def choose(
+        self,
+        features: Mapping[Candidate, tuple[float, ...]],
+        allowed: Collection[Candidate] | None = None,
+    ) -> Choice:
+        """Pick the candidate of the highest predicted mAP', the earlier if equal.
 
-    @property
-    def fallback_k(self) -> int:
-        """The k of the best fixed choice."""
-        return self.fitted.fixed[0].k
+        Where two are joined, the next best of the same k goes with it. If any candidate's
+        features lie outside those of training, what was best for all is taken instead, and the
+        reason says so.
 
-    def choose(self, features: Mapping[Pair, Complementarity], ks: Sequence[int]) -> Choice:
-        """Pick a pair and k for a photo: see `Fitted.choose`."""
-        return self.fitted.choose(features, ks)
+        Parameters
+        ----------
+        features : of every candidate: of `candidates.FEATURES` as many as the variant needs.
+        allowed : candidates that the user left open; None: all.
+
+        Raises
+        ------
+        WrongInput : features of a candidate are missing, or no candidate is allowed.
+        """
+        known = self.candidates()
+        needed = 1 + max((FEATURES.index(each.term) for each in self.ranges), default=-1)
+        if any(each not in features or len(features[each]) < needed for each in known):
+            raise WrongInput(
+                f"the adaptive choice needs the first {needed} features of every pair and k that "
+                "it knows"
+            )
+        table = np.zeros((1, len(known), len(FEATURES)))
+        for row, candidate in enumerate(known):
+            table[0, row, : len(features[candidate])] = features[candidate]
+        outside = self._outside(table)
+        if outside:
+            return self.best_fixed(allowed, f"fallback to what was best for all: {outside}")
+        predicted = self._regression().predict(table)[0]
+        ranked = sorted(
+            (row for row, each in enumerate(known) if allowed is None or each in allowed),
+            key=lambda row: -predicted[row],
+        )
+        best = [(known[row], float(predicted[row])) for row in ranked]
+        return self._joined(best, f"highest predicted mAP of {len(best)} choices", allowed)
+
+    def best_fixed(self, allowed: Collection[Candidate] | None, reason: str) -> Choice:
+        """Take what was best for all training queries.
+
+        Raises
+        ------
+        WrongInput : no candidate is allowed.
+        """
+        best = [
+            ((each.pair, each.k), each.mean_ap)
+            for each in self.fixed
+            if allowed is None or (each.pair, each.k) in allowed
+        ]
+        return self._joined(best, reason, allowed)
+
+    def _joined(
+        self,
+        best: Sequence[tuple[Candidate, float]],
+        reason: str,
+        allowed: Collection[Candidate] | None,
+    ) -> Choice:
+        """Take the first, and if two are joined the next of the same k; best first."""
+        if not best:
+            raise self._nothing_allowed(allowed)
+        (_, k), expected = best[0]
+        pairs = [pair for (pair, of_k), _ in best if of_k == k]
+        return Choice(tuple(pairs[: self.n_joined]), k, expected, reason)
 
     def summary(self) -> str:
         """Say in one line what the choice is worth beside its controls."""
-        scores = self.left_out
+        scores, best = self.left_out, self.fixed[0]
         n_queries = sum(one.n_queries for one in self.trained_on)
         return (
-            f"{n_queries} queries, each with its place left out: adaptive ({self.variant}) mAP "
-            f"{scores.adaptive:.3f}, best fixed {scores.best_fixed:.3f}, random "
-            f"{scores.random:.3f}, oracle {scores.oracle:.3f}; fallback "
-            f"{'-'.join(self.fallback_pair)} with k = {self.fallback_k}"
+            f"{n_queries} queries, each with its place left out: {self._name()} mAP "
+            f"{scores.adaptive.mean:.3f}, best fixed pair {scores.best_fixed:.3f} (difference "
+            f"{_interval(scores.gain)}), random {scores.random:.3f}, oracle {scores.oracle:.3f}; "
+            f"{scores.n_chosen} different choices; best for all: {'-'.join(best.pair)} with "
+            f"k = {best.k}"
+        )
+
+    def _name(self) -> str:
+        joined = "" if self.n_joined == 1 else ", the two best joined"
+        return f"chosen ({self.variant}{joined})"
+
+    def _regression(self) -> Regression:
+        values = np.array([each.value for each in self.coefficients])
+        return Regression(VARIANTS[self.variant], self.candidates(), values, self.level)
+
+    def _outside(self, table: np.ndarray) -> str:
+        """Name the terms outside their range in training; empty if none is."""
+        seen = used_features(VARIANTS[self.variant], table)[0]
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        return " and ".join(
+            f"{each.term} was {each.low:.3g} to {each.high:.3g} in training, here {least:.3g} to "
+            f"{most:.3g}"
+            for each, least, most in zip(self.ranges, low, high, strict=True)
+            if least < each.low or most > each.high
+        )
+
+    def _nothing_allowed(self, allowed: Collection[Candidate] | None) -> WrongInput:
+        known = ", ".join(str(k) for k in sorted({k for _, k in self.candidates()}))
+        return WrongInput(
+            f"the adaptive model chooses k from {known} and pairs of {', '.join(self.detectors)}; "
+            f"{len(allowed or ())} choices were left to it and it knows none of them. Give both "
+            "--pair and --k"
         )
 
 
-def fit(
-    rows: Sequence[TrainingRow],
-    *,
-    detectors: tuple[Detector, ...],
-    descriptors: tuple[Descriptor, ...],
-    vote: Vote,
-    weights: tuple[Weight, ...],
-    trained_on: tuple[TrainingSet, ...],
-) -> ChoiceModel:
-    """Fit Eq. 1 per k by least squares, and score it with each place left out in turn.
-
-    Its two variants are both scored; the one that does better on places left out is kept.
-
-    Parameters
-    ----------
-    rows : one per query, pair and k.
-    detectors, descriptors, vote, weights : the search whose APs the rows hold.
-    trained_on : where the queries come from.
-
-    Raises
-    ------
-    WrongInput : no rows, fewer than two places, or a query that lacks pairs or k that others
-        have, or has one twice, or lies in two places.
-    """
-    queries = _by_query(rows)
-    scores = {variant: _left_out(rows, queries, variant) for variant in get_args(Variant)}
-    variant: Variant = max(scores, key=lambda name: scores[name].adaptive)
-    return ChoiceModel(
-        variant=variant,
-        detectors=detectors,
-        descriptors=descriptors,
-        vote=vote,
-        weights=weights,
-        fitted=fit_equations(rows, variant),
-        left_out=scores[variant],
-        trained_on=trained_on,
-    )
-
-
-def _by_query(rows: Sequence[TrainingRow]) -> dict[str, list[TrainingRow]]:
-    queries: dict[str, list[TrainingRow]] = defaultdict(list)
-    for row in rows:
-        queries[row.query].append(row)
-    wanted = {(row.pair, row.k) for row in rows}
-    for query, own in queries.items():
-        if len(own) != len(wanted) or {(row.pair, row.k) for row in own} != wanted:
-            raise WrongInput(
-                f"{query} has {len(own)} training rows, expected one for each of the "
-                f"{len(wanted)} pairs and k; search it with all of them"
-            )
-        if len({row.place for row in own}) > 1:
-            raise WrongInput(f"{query} lies in {len({row.place for row in own})} places, not one")
-    n_places = len({row.place for row in rows})
-    if n_places < 2:
-        raise WrongInput(
-            f"the adaptive choice is judged with each place left out: queries of at least 2 "
-            f"places are needed, got {n_places}"
-        )
-    return queries
-
-
-def _left_out(
-    rows: Sequence[TrainingRow],
-    queries: Mapping[str, Sequence[TrainingRow]],
-    variant: Variant,
-) -> LeftOutScores:
-    adaptive, best_fixed = [], []
-    for place in sorted({row.place for row in rows}):
-        fitted = fit_equations([row for row in rows if row.place != place], variant)
-        ks = [equation.k for equation in fitted.equations]
-        for own in queries.values():
-            if own[0].place != place:
-                continue
-            ap = {(row.pair, row.k): row.ap for row in own}
-            chosen = fitted.choose({row.pair: row.features for row in own}, ks)
-            adaptive.append(ap[chosen.pair, chosen.k])
-            best_fixed.append(ap[fitted.fixed[0].pair, fitted.fixed[0].k])
-    n_queries = len(queries)
-    return LeftOutScores(
-        adaptive=sum(adaptive) / n_queries,
-        best_fixed=sum(best_fixed) / n_queries,
-        oracle=sum(max(row.ap for row in own) for own in queries.values()) / n_queries,
-        random=sum(row.ap for row in rows) / len(rows),
-    )
+def _interval(value: Range) -> str:
+    if value.low is None or value.high is None:
+        return f"{value.mean:+.3f}"
+    return f"{value.mean:+.3f} [{value.low:+.3f}, {value.high:+.3f}]"

@@ -10,7 +10,7 @@ import faiss
 import numpy as np
 from numpy.typing import NDArray
 
-from contracts.config import MAX_NEIGHBOURS, CodebookConfig
+from contracts.config import MAX_NEIGHBOURS, CodebookConfig, DistanceScale
 from contracts.errors import VocabularyMismatch, WrongInput
 from retrieval.clustering import flat_kmeans, kmeans, one_thread
 from retrieval.word_search import WordTable, exhaustive_index, list_index
@@ -32,11 +32,17 @@ class Codebook:
 
     words : (V, D) uint8. dmin : smallest squared distance of a sample point to its nearest word.
     dmax : (MAX_NEIGHBOURS,) float32, at k-1 the largest squared distance to the k-th nearest.
+    d99 : the same of the 99th percentile, the least that 99 % of the sample do not exceed.
     """
 
     words: NDArray[np.uint8]
     dmin: float
     dmax: NDArray[np.float32]
+    d99: NDArray[np.float32]
+
+    def farthest(self, k: int, scale: DistanceScale) -> float:
+        """The squared distance at which d' of a search for k words is 1."""
+        return float((self.d99 if scale == "percentile" else self.dmax)[k - 1])
 
 
 class WordSearcher:
@@ -200,7 +206,8 @@ def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebo
             "ask for at least one and at most as many as there are"
         )
     if not len(sample):
-        return Codebook(sample.copy(), 0.0, np.zeros(MAX_NEIGHBOURS, dtype=np.float32))
+        nowhere = np.zeros(MAX_NEIGHBOURS, dtype=np.float32)
+        return Codebook(sample.copy(), 0.0, nowhere, nowhere)
     words = np.unique(kmeans(sample, n_words, seed), axis=0)
     return Codebook(words, *_distance_range(sample[:_DISTANCE_SAMPLE], words))
 
@@ -214,12 +221,11 @@ def _mixed(state: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 def _distance_range(
     sample: NDArray[np.uint8], words: NDArray[np.uint8]
-) -> tuple[float, NDArray[np.float32]]:
-    """dmin and dmax of METHOD section 3, by exhaustive search; the last k stands in for more."""
+) -> tuple[float, NDArray[np.float32], NDArray[np.float32]]:
+    """dmin, dmax and d99 by exhaustive search; the last k stands in for more than V words."""
     width = min(MAX_NEIGHBOURS, len(words))
     with one_thread():
         _, sq_dist = WordTable(exhaustive_index(words)).nearest(sample, width)
-    dmax = np.empty(MAX_NEIGHBOURS, dtype=np.float32)
-    dmax[:width] = sq_dist.max(axis=0)
-    dmax[width:] = dmax[width - 1]
-    return float(sq_dist[:, 0].min()), dmax
+    of_k = np.minimum(np.arange(MAX_NEIGHBOURS), width - 1)
+    percentile = np.percentile(sq_dist, 99, axis=0, method="inverted_cdf").astype(np.float32)
+    return float(sq_dist[:, 0].min()), sq_dist.max(axis=0)[of_k], percentile[of_k]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from contracts.config import Detector
 from contracts.errors import BadTruth
+from retrieval.fusion import Scores
 
 Ranking = Sequence[int] | NDArray[np.int64]
 """Image ids, best first."""
@@ -19,6 +20,7 @@ class QueryResult:
 
     first_hit_rank : 1 = best, junk not counted; None if no relevant image was ranked.
     detectors, k : what was used. seconds : wall time of the search.
+    choice : how detectors and k came to be; empty where nobody asked.
     """
 
     query: str
@@ -29,6 +31,16 @@ class QueryResult:
     detectors: tuple[Detector, ...]
     k: int
     seconds: float
+    choice: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Scored:
+    """How well a ranking answers a query; fields as in `QueryResult`."""
+
+    ap: float
+    ap_10: float
+    first_hit_rank: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,17 +140,38 @@ def judge(
     BadTruth : no relevant image is left.
     """
     wanted = _wanted(relevant, junk)
-    hits = _hits(ranking, wanted, junk)
+    scored = _scored(_hits(ranking, wanted, junk), len(wanted))
     return QueryResult(
         query=query,
-        ap=_area(hits, len(wanted)),
-        ap_10=_area([rank for rank in hits if rank <= 10], min(10, len(wanted))),
-        first_hit_rank=hits[0] if hits else None,
+        ap=scored.ap,
+        ap_10=scored.ap_10,
+        first_hit_rank=scored.first_hit_rank,
         n_relevant=len(wanted),
         detectors=detectors,
         k=k,
         seconds=seconds,
     )
+
+
+def judge_scores(scores: Scores, relevant: Collection[int], junk: Collection[int]) -> Scored:
+    """Score the ranking that `retrieval.fusion.full_ranking` makes, without making it.
+
+    Raises
+    ------
+    BadTruth : no relevant image is left.
+    """
+    wanted = np.array(sorted(_wanted(relevant, junk)), dtype=np.int64)
+    kept = np.ones(len(scores.values), dtype=np.bool_)
+    kept[list(junk)] = False
+    values = np.where(scores.touched, scores.values, -np.inf)[kept]
+    ids = np.flatnonzero(kept)
+    hits = [
+        1 + int(np.count_nonzero((values > value) | ((values == value) & (ids < image))))
+        for image, value in zip(
+            wanted, np.where(scores.touched, scores.values, -np.inf)[wanted], strict=True
+        )
+    ]
+    return _scored(sorted(hits), len(wanted))
 
 
 def summarise(results: Sequence[QueryResult], n_excluded: int = 0) -> Summary:
@@ -176,6 +209,14 @@ def _wanted(relevant: Collection[int], junk: Collection[int]) -> set[int]:
             "AP needs at least one: exclude the query"
         )
     return wanted
+
+
+def _scored(hits: Sequence[int], n_relevant: int) -> Scored:
+    return Scored(
+        ap=_area(hits, n_relevant),
+        ap_10=_area([rank for rank in hits if rank <= 10], min(10, n_relevant)),
+        first_hit_rank=hits[0] if hits else None,
+    )
 
 
 def _hits(ranking: Ranking, wanted: set[int], junk: Collection[int]) -> list[int]:

@@ -3,27 +3,26 @@
 METHOD section 3, after Bhowmik, Weng, Gouet-Brunet & Soheilian, JURSE 2017.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise, starmap
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contracts.config import SearchConfig
-from contracts.errors import BadConfig, BadIndex, VocabularyMismatch, WrongInput
+from contracts.config import DESCRIPTORS, SearchConfig
+from contracts.errors import BadConfig, VocabularyMismatch, WrongInput
 from contracts.records import Match
 from retrieval import fusion_kernels as kernels
 from retrieval.channel_query import ChannelQuery, word_distances, word_factors, word_spans
-from retrieval.fusion_walk import vote_union_walk
+from retrieval.fusion_kernels import Tally, Words
+from retrieval.fusion_walk import walked_votes
+from retrieval.fusion_words import beyond_catalogue, kept_words, union_votes
 from retrieval.postings import read_only
 
 __all__ = ["ChannelQuery", "Scores", "full_ranking", "fuse", "rank"]
 
-_BLOCK_POSTINGS = 1 << 18
-"""Postings gathered at a time: a megabyte, so that votes find them in the cache."""
-
-_LAST_TOKEN = 2**31 - 1
+_RANGE_IMAGES = 1 << 17
+"""Images that are voted for at a time: the tallies of so many stay in the cache."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +43,14 @@ def fuse(
     distinct_words: NDArray[np.int64] | None = None,
     removed: NDArray[np.bool_] | None = None,
 ) -> Scores:
-    """Score all images by the votes of all keypoints of one or two detectors.
+    """Score all images by the votes of all keypoints of one detector or more.
+
+    Memory is that of the result, of the words asked for, and of a range of images.
 
     Parameters
     ----------
     detectors : for each detector used its channels, all with the same n keypoints in one order.
-    config : `vote`, `weights` and `max_images` (the T of the walk) are used.
+    config : `vote`, `weights`, `max_images` (the T of the walk) and `union_distance` are used.
     distinct_words : (n_images,) int64, summed over the channels used; needed by `norm` alone.
     removed : (n_images,) bool; scores are those of an index that never held these images.
 
@@ -57,34 +58,37 @@ def fuse(
     ------
     BadConfig : the vote needs more descriptors, or a weight what was not given.
     WrongInput : channels of one detector, or per-image arrays, differ in length.
-    BadIndex : word, offset or image ids out of bounds.
+    BadIndex : word or offset out of bounds, or images of a word out of bounds or order.
     VocabularyMismatch : an idf does not fit its postings.
     """
     _check(detectors, n_images, config, distinct_words, removed)
-    gone = read_only(np.zeros(0, np.bool_) if removed is None else removed, np.bool_)
-    values = np.zeros(n_images, dtype=np.float64)
-    touched = np.zeros(n_images, dtype=np.bool_)
-    for channels in detectors:
-        tally = _detector_votes(channels, n_images, config, gone)
-        burst = np.sqrt(np.maximum(tally.voters, 1)) if "burst" in config.weights else 1.0
-        values += tally.score / burst
-        touched |= tally.voters > 0
-    if "norm" in config.weights and distinct_words is not None:
-        values /= np.sqrt(np.maximum(distinct_words, 1))
-    return Scores(values, touched)
+    gone = np.zeros(n_images, dtype=np.bool_) if removed is None else removed
+    asked = [_words(channels, config, read_only(gone, np.bool_)) for channels in detectors]
+    scores = Scores(np.zeros(n_images, dtype=np.float64), np.zeros(n_images, dtype=np.bool_))
+    tally = _tally(min(n_images, _RANGE_IMAGES))
+    for first in range(0, n_images, _RANGE_IMAGES):
+        images = slice(first, min(first + _RANGE_IMAGES, n_images))
+        for words in asked:
+            _vote(words, images, tally, config, scores)
+        if "norm" in config.weights and distinct_words is not None:
+            scores.values[images] /= np.sqrt(np.maximum(distinct_words[images], 1))
+    if any(np.any(words.cursor < words.stop) for words in asked):
+        raise beyond_catalogue(n_images)
+    if removed is not None:
+        scores.values[removed], scores.touched[removed] = 0.0, False
+    return scores
 
 
 def rank(scores: Scores, top: int | None) -> tuple[Match, ...]:
     """List the best `top` touched images (None: all), ties by image id."""
-    candidates = np.flatnonzero(scores.touched)
-    values = scores.values[candidates]
-    if top is not None and top < len(candidates):
-        least = np.partition(values, len(values) - top)[len(values) - top]
-        candidates, values = candidates[values >= least], values[values >= least]
-    order = np.argsort(-values, kind="stable")[:top]
+    wanted = scores.touched
+    if top is not None:
+        wanted = wanted & (scores.values >= kernels.least_of_best(scores.values, wanted, top))
+    images = np.flatnonzero(wanted)
+    best = images[np.argsort(-scores.values[images], kind="stable")[:top]]
     return tuple(
-        Match(int(candidates[at]), place, float(values[at]))
-        for place, at in enumerate(order, start=1)
+        Match(int(image), place, float(scores.values[image]))
+        for place, image in enumerate(best, start=1)
     )
 
 
@@ -94,123 +98,67 @@ def full_ranking(scores: Scores) -> NDArray[np.int64]:
     return np.lexsort((ids, -np.where(scores.touched, scores.values, 0.0), ~scores.touched))
 
 
-@dataclass(frozen=True, slots=True)
-class _Tally:
-    """Votes of one detector's keypoints so far, added to in place by the kernels.
-
-    score : (n_images,) float64. voters : (n_images,) int32, keypoints that voted.
-    seen : (n_images,) int32 tokens. running : (n_images,) float64, scratch of a keypoint.
-    """
-
-    score: NDArray[np.float64]
-    voters: NDArray[np.int32]
-    seen: NDArray[np.int32]
-    running: NDArray[np.float64]
-
-
-def _detector_votes(
-    channels: Sequence[ChannelQuery],
-    n_images: int,
-    config: SearchConfig,
-    removed: NDArray[np.bool_],
-) -> _Tally:
-    tally = _Tally(
-        score=np.zeros(n_images, dtype=np.float64),
-        voters=np.zeros(n_images, dtype=np.int32),
-        seen=np.zeros(n_images, dtype=np.int32),
-        running=np.empty(n_images, dtype=np.float64),
-    )
+def _words(
+    channels: Sequence[ChannelQuery], config: SearchConfig, removed: NDArray[np.bool_]
+) -> Words:
+    """List the words of a detector's keypoints that vote, and their votes."""
+    lists = _lists(channels)
     spans = word_spans(channels)
     distances = word_distances(channels)
-    factors = word_factors(channels, use_idf="idf" in config.weights)
-    lists = tuple(read_only(channel.postings.image_ids, np.uint32) for channel in channels)
     if config.vote == "intersection":
-        ended = kernels.vote_intersection(
-            lists,
-            spans,
-            distances,
-            factors,
-            removed,
-            tally.seen,
-            tally.running,
-            tally.score,
-            tally.voters,
-        )
-        if ended == kernels.BAD_IMAGE:
-            raise _beyond_catalogue(n_images)
+        # Whoever lacks a descriptor's images gives no vote anyway.
+        taken, votes = spans[..., 0] < spans[..., 1], 1.0 - distances
     else:
-        _gather_and_vote(lists, spans, distances, factors, config, removed, tally)
-    return tally
-
-
-def _gather_and_vote(
-    lists: tuple[NDArray[np.uint32], ...],
-    spans: NDArray[np.int64],
-    distances: NDArray[np.float64],
-    factors: NDArray[np.float64],
-    config: SearchConfig,
-    removed: NDArray[np.bool_],
-    tally: _Tally,
-) -> None:
-    """Vote by a rule that must know each word's own images first, a block at a time."""
-    sizes = (spans[..., 1] - spans[..., 0]).sum(axis=(1, 2))
-    blocks = list(_blocks(sizes))
-    images = np.empty(max(int(sizes[block].sum()) for block in blocks), dtype=np.uint32)
-    token = 0
-    for block in blocks:
-        n_points = block.stop - block.start
-        tokens_used = n_points * 2 * (len(lists) + 1)
-        if token + tokens_used >= _LAST_TOKEN:
-            tally.seen[:] = 0
-            token = 0
-        segments = np.zeros_like(spans[block])
-        filled = 0
-        for at, image_ids in enumerate(lists):
-            start = token + at * n_points
-            filled = kernels.gather(
-                image_ids, spans[block], removed, at, tally.seen, start, images, filled, segments
+        taken = kept_words(lists, spans, removed)
+        if config.vote == "pairwise":
+            votes = 1.0 - distances
+        elif config.max_images is None:
+            votes = union_votes(distances, taken, config.union_distance)
+        else:
+            votes, taken = walked_votes(
+                lists, spans, distances, taken, config.max_images, removed, config.union_distance
             )
-            if filled == kernels.BAD_IMAGE:
-                raise _beyond_catalogue(len(tally.seen))
-        start = token + len(lists) * n_points
-        _vote(images, segments, distances[block], factors[block], config, start, tally)
-        token += tokens_used
+    votes = votes * word_factors(channels, use_idf="idf" in config.weights)
+    point, descriptor, _ = np.nonzero(taken)
+    token = (1 + point * len(channels) + descriptor).astype(np.int32)
+    start, stop = spans[taken].T
+    return Words(lists, len(channels), descriptor, token, start.copy(), stop.copy(), votes[taken])
 
 
-def _vote(
-    images: NDArray[np.uint32],
-    segments: NDArray[np.int64],
-    distances: NDArray[np.float64],
-    factors: NDArray[np.float64],
-    config: SearchConfig,
-    token: int,
-    tally: _Tally,
-) -> None:
-    seen, score, voters = tally.seen, tally.score, tally.voters
-    if config.vote == "pairwise":
-        kernels.vote_pairwise(
-            images, segments, distances, factors, seen, token, tally.running, score, voters
-        )
-    elif config.max_images is None:
-        kernels.vote_union(images, segments, distances, factors, seen, token, score, voters)
-    else:
-        vote_union_walk(
-            images, segments, distances, factors, config.max_images, seen, token, score, voters
-        )
+def _lists(channels: Sequence[ChannelQuery]) -> tuple[NDArray[np.uint32], ...]:
+    """The channels' image ids, and empty lists up to a length that kernels are compiled for."""
+    lists = [read_only(channel.postings.image_ids, np.uint32) for channel in channels]
+    missing = len(DESCRIPTORS) - len(lists)
+    return (*lists, *[read_only(np.zeros(0, dtype=np.uint32), np.uint32)] * missing)
 
 
-def _blocks(sizes: NDArray[np.int64]) -> Iterator[slice]:
-    """Cut keypoints into runs of about `_BLOCK_POSTINGS`, at least one keypoint each."""
-    block = np.cumsum(sizes) // _BLOCK_POSTINGS
-    cuts = np.flatnonzero(np.diff(block)) + 1
-    return starmap(slice, pairwise([0, *cuts.tolist(), len(sizes)]))
-
-
-def _beyond_catalogue(n_images: int) -> BadIndex:
-    return BadIndex(
-        f"an inverted index names an image beyond the catalogue's {n_images}; "
-        "the index is damaged: restore it or index again"
+def _tally(size: int) -> Tally:
+    return Tally(
+        seen=np.zeros(size, dtype=np.int32),
+        running=np.zeros(size, dtype=np.float64),
+        score=np.zeros(size, dtype=np.float64),
+        voters=np.zeros(size, dtype=np.int32),
     )
+
+
+def _vote(words: Words, images: slice, tally: Tally, config: SearchConfig, scores: Scores) -> None:
+    """Add one detector's votes for a range of images to their scores."""
+    size = images.stop - images.start
+    seen, running, score, voters = tally
+    tally = Tally(seen[:size], running[:size], score[:size], voters[:size])
+    for array in (tally.seen, tally.score, tally.voters):
+        array[:] = 0
+    is_burst = "burst" in config.weights
+    if config.vote == "union":
+        kernels.vote_union(words, images.start, tally, is_burst)
+    elif config.vote == "intersection":
+        kernels.vote_intersection(words, images.start, tally)
+    else:
+        kernels.vote_pairwise(words, images.start, tally)
+    if is_burst:
+        tally.score[:] /= np.sqrt(np.maximum(tally.voters, 1))
+    scores.values[images] += tally.score
+    scores.touched[images] |= tally.voters > 0
 
 
 def _check(

@@ -8,23 +8,96 @@ among the cells' next ones: the same pairs as from that algorithm's heap, withou
 import numpy as np
 from numpy.typing import NDArray
 
-from retrieval.fusion_kernels import give_votes, is_skipped
+from contracts.config import UnionDistance
+from retrieval.fusion_words import beyond_catalogue
 from retrieval.kernels import kernel
 
-_Seen = NDArray[np.int32]
+_Lists = tuple[NDArray[np.uint32], ...]
 _Floats = NDArray[np.float64]
 _Offsets = NDArray[np.int64]
 
+_OUT_OF_BOUNDS = -1
+_ALWAYS_SEEN = 255
+
+
+def walked_votes(
+    lists: _Lists,
+    spans: _Offsets,
+    distances: _Floats,
+    kept: NDArray[np.bool_],
+    max_images: int,
+    removed: NDArray[np.bool_],
+    distance: UnionDistance,
+) -> tuple[_Floats, NDArray[np.bool_]]:
+    """Give each word the sum of 1 - distance over the cells taken that it is in.
+
+    T is at work where two lists are joined, left to right over the descriptors; a single
+    descriptor has no join and no cut. Arguments are as in `fusion_words`.
+
+    Returns
+    -------
+    votes : (n, L, k) float64. taken : (n, L, k) bool, the word is in a cell; for each
+        descriptor the first of its kept words, so that the others take no image from them.
+
+    Raises
+    ------
+    BadIndex : an image beyond `removed` was met.
+    """
+    scale = 1.0 / kept.shape[1] if distance == "mean" else 1.0
+    votes = np.zeros(kept.shape, dtype=np.float64)
+    taken = np.zeros(kept.shape, dtype=np.bool_)
+    if not _walk(lists, spans, distances, kept, max_images, removed, scale, votes, taken):
+        raise beyond_catalogue(len(removed))
+    return votes, taken
+
 
 @kernel
-def _count_new(images: NDArray[np.uint32], start: int, stop: int, seen: _Seen, token: int) -> int:
-    fresh = 0
-    for at in range(start, stop):
-        image = images[at]
-        if seen[image] != token:
-            seen[image] = token
-            fresh += 1
-    return fresh
+def _walk(
+    lists: _Lists,
+    spans: _Offsets,
+    distances: _Floats,
+    kept: NDArray[np.bool_],
+    max_images: int,
+    removed: NDArray[np.bool_],
+    scale: float,
+    votes: _Floats,
+    taken: NDArray[np.bool_],
+) -> bool:
+    n_points, n_descriptors, _ = kept.shape
+    # A byte an image stays in the cache; removed images always count as seen.
+    none_seen = np.where(removed, _ALWAYS_SEEN, 0).astype(np.uint8)
+    seen = none_seen.copy()
+    token = 0
+    for point in range(n_points):
+        words = np.flatnonzero(kept[point, 0])
+        cells = np.zeros((len(words), n_descriptors), dtype=np.int64)
+        cells[:, 0] = words
+        cell_distance = distances[point, 0][words]
+        for descriptor in range(1, n_descriptors):
+            token += 1
+            if token == _ALWAYS_SEEN:
+                seen[:] = none_seen
+                token = 1
+            n_taken, cells, cell_distance = _join(
+                cells,
+                cell_distance,
+                descriptor,
+                distances[point],
+                kept[point],
+                lists,
+                spans[point],
+                max_images,
+                seen,
+                token,
+            )
+            if n_taken == _OUT_OF_BOUNDS:
+                return False
+        for cell in range(len(cells)):
+            for descriptor in range(n_descriptors):
+                rank = cells[cell, descriptor]
+                votes[point, descriptor, rank] += 1.0 - scale * cell_distance[cell]
+                taken[point, descriptor, rank] = True
+    return True
 
 
 @kernel
@@ -33,19 +106,25 @@ def _join(
     cell_distance: _Floats,
     descriptor: int,
     distances: _Floats,
-    segments: _Offsets,
-    images: NDArray[np.uint32],
+    kept: NDArray[np.bool_],
+    lists: _Lists,
+    spans: _Offsets,
     max_images: int,
-    seen: _Seen,
+    seen: NDArray[np.uint8],
     token: int,
-) -> tuple[_Offsets, _Floats]:
-    """Pair `cells` (m, L) of ranks with one descriptor's words until T images are seen."""
-    words = np.flatnonzero(segments[descriptor, :, 1] > segments[descriptor, :, 0])
+) -> tuple[int, _Offsets, _Floats]:
+    """Pair `cells` (m, L) of ranks with one descriptor's words until T images are seen.
+
+    `at_most` bounds the images seen by the lengths of the lists: only where it reaches T are
+    images counted one by one, those of `waiting` words.
+    """
+    words = np.flatnonzero(kept[descriptor])
     joined = np.empty((len(cells) * len(words), cells.shape[1]), dtype=np.int64)
     joined_distance = np.empty(len(joined))
     next_word = np.zeros(len(cells), dtype=np.int64)
-    counted = np.zeros(distances.shape, dtype=np.bool_)
-    n_images = taken = 0
+    met = np.zeros(kept.shape, dtype=np.bool_)
+    waiting = np.zeros(kept.shape, dtype=np.bool_)
+    n_images = at_most = taken = 0
     while n_images < max_images and taken < len(joined):
         best, least = -1, np.inf
         for u in range(len(cells)):
@@ -61,58 +140,39 @@ def _join(
         next_word[best] += 1
         for part in range(descriptor + 1):
             rank = joined[taken, part]
-            if not counted[part, rank]:
-                counted[part, rank] = True
-                start, stop = segments[part, rank]
-                n_images += _count_new(images, start, stop, seen, token)
+            if not met[part, rank]:
+                met[part, rank] = waiting[part, rank] = True
+                at_most += spans[part, rank, 1] - spans[part, rank, 0]
+        if at_most >= max_images:
+            fresh = _count_new(lists, spans, waiting, seen, token, max_images - n_images)
+            if fresh == _OUT_OF_BOUNDS:
+                return _OUT_OF_BOUNDS, joined, joined_distance
+            n_images += fresh
+            at_most = n_images
+            waiting[:] = False
         taken += 1
-    return joined[:taken], joined_distance[:taken]
+    return taken, joined[:taken], joined_distance[:taken]
 
 
 @kernel
-def vote_union_walk(
-    images: NDArray[np.uint32],
-    segments: _Offsets,
-    distances: _Floats,
-    squared_idf: _Floats,
-    max_images: int,
-    seen: _Seen,
+def _count_new(
+    lists: _Lists,
+    spans: _Offsets,
+    waiting: NDArray[np.bool_],
+    seen: NDArray[np.uint8],
     token: int,
-    score: _Floats,
-    voters: _Seen,
-) -> None:
-    """Add 1 - distance for each occurrence in the cells taken, left to right over descriptors.
-
-    T is at work where two lists are joined; a single descriptor has no join and no cut.
-    """
-    n_points, n_descriptors, k = distances.shape
-    weights = np.empty((n_descriptors, k), dtype=np.float64)
-    for point in range(n_points):
-        if is_skipped(segments, point):
-            continue
-        base = token + 1 + point * (n_descriptors + 1)
-        kept = np.flatnonzero(segments[point, 0, :, 1] > segments[point, 0, :, 0])
-        cells = np.zeros((len(kept), n_descriptors), dtype=np.int64)
-        cells[:, 0] = kept
-        cell_distance = distances[point, 0][kept]
-        for descriptor in range(1, n_descriptors):
-            cells, cell_distance = _join(
-                cells,
-                cell_distance,
-                descriptor,
-                distances[point],
-                segments[point],
-                images,
-                max_images,
-                seen,
-                base + descriptor,
-            )
-        weights[:] = np.nan
-        for cell in range(len(cells)):
-            for descriptor in range(n_descriptors):
-                rank = cells[cell, descriptor]
-                if np.isnan(weights[descriptor, rank]):
-                    weights[descriptor, rank] = 0.0
-                weights[descriptor, rank] += 1.0 - cell_distance[cell]
-        weights *= squared_idf[point]
-        give_votes(images, segments, weights, point, seen, base, score, voters)
+    enough: int,
+) -> int:
+    """Count and mark the images of waiting words that this join has not seen, to `enough`."""
+    fresh = 0
+    for part, rank in np.argwhere(waiting):
+        if fresh >= enough:
+            break
+        start, stop = spans[part, rank]
+        for image in lists[part][start:stop]:
+            if image >= len(seen):
+                return _OUT_OF_BOUNDS
+            marked = seen[image]
+            fresh += marked < token
+            seen[image] = max(marked, token)
+    return fresh

@@ -6,12 +6,17 @@ symmetric in their systems, and an image that no system touched stays untouched,
 
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import WrongInput
 from retrieval.fusion import Scores, full_ranking
+
+LateFusion = Literal["comb_sum", "comb_mnz", "borda", "reciprocal_rank"]
+
+_MAY_BE_RIGHT = 10
 
 RRF_CONSTANT = 60
 """Keeps the first ranks of one system from outvoting all others; Cormack et al.'s own value."""
@@ -78,7 +83,7 @@ def reciprocal_rank(systems: Sequence[Scores]) -> Scores:
     return Scores(values, _touched(systems))
 
 
-LATE_FUSIONS: Mapping[str, Callable[[Sequence[Scores]], Scores]] = MappingProxyType(
+LATE_FUSIONS: Mapping[LateFusion, Callable[[Sequence[Scores]], Scores]] = MappingProxyType(
     {
         "comb_sum": comb_sum,
         "comb_mnz": comb_mnz,
@@ -103,6 +108,29 @@ def check_systems(systems: Sequence[Scores]) -> None:
             f"the systems to fuse score {sorted(sizes)} images; all must score the same ones: "
             "take them from one index"
         )
+
+
+def standardised(system: Scores) -> Scores:
+    """Scores in standard deviations above the median of the crowd.
+
+    Unlike a min-max, the scale does not hang on the best image: the ten best, at most a quarter,
+    are left out of the deviation, for they may be right. An untouched image counts with 0 before
+    it is standardised. Two rankings of a choice are joined by the sum of these.
+    """
+    values = system.values
+    n_crowd = len(values) - min(_MAY_BE_RIGHT, len(values) // 4)
+    if n_crowd == 0:
+        return system
+    deviation = float(np.partition(values, n_crowd - 1)[:n_crowd].std())
+    above = values - np.median(values)
+    return Scores(above / deviation if deviation > 0 else above, system.touched)
+
+
+def standardised_sum(systems: Sequence[Scores]) -> Scores:
+    """Add up `standardised` scores. Parameters and errors as `comb_sum`."""
+    check_systems(systems)
+    values = np.sum([standardised(system).values for system in systems], axis=0)
+    return Scores(values, _touched(systems))
 
 
 def _sum(systems: Sequence[Scores]) -> NDArray[np.float64]:

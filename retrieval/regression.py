@@ -1,208 +1,193 @@
-"""Eq. 1 of Bhowmik et al., JURSE 2017: how well a pair of detectors should do on a photo.
+"""Regressions of a candidate's AP on what is known of it: Eq. 1 of Bhowmik et al. and variants.
 
-mAP' = b1 Kp + b2 CSDi + b3 CSCo + b4 CSCl, one equation per k, no intercept. METHOD section 4
-says what is reconstructed: one row per (query, pair), fitted to that query's AP. The variant
-`pair_offsets` adds a constant of the pair: Eq. 1 alone cannot say that a detector is good.
+mAP' = b1 Kp + b2 CSDi + b3 CSCo + b4 CSCl, one equation per k, no intercept (JURSE 2017). METHOD
+section 4 says what is reconstructed: a row for each query and pair, with that query's AP.
 """
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from numpy.typing import NDArray
 
-from contracts.config import MAX_NEIGHBOURS, Detector
-from contracts.errors import WrongInput
-from retrieval.complementarity import Complementarity
+from contracts.config import VariantName
+from retrieval.candidates import (
+    COMPLEMENTARITY,
+    CROWDING,
+    FEATURES,
+    LOOK,
+    Candidate,
+    Pair,
+)
+from retrieval.trials import Trials
 
-Pair = tuple[Detector, Detector]
-K = Annotated[int, Field(ge=1, le=MAX_NEIGHBOURS)]
-Four = tuple[float, float, float, float]
-Variant = Literal["eq1", "pair_offsets"]
+_RIDGE = 0.03
+"""Of the variants with many constants, on standardised columns."""
 
-FEATURES = ("Kp", "CSDi", "CSCo", "CSCl")
-
-
-@dataclass(frozen=True, slots=True)
-class TrainingRow:
-    """What one pair and k achieved on one query. place : queries of one are left out together."""
-
-    query: str
-    place: str
-    pair: Pair
-    k: int
-    features: Complementarity
-    ap: float
+_Rows = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
-    """What a photo is to be searched with, what is expected of it, and why."""
+class Variant:
+    """One form of the regression; `fixed` looks at nothing and chooses the same for all.
 
-    pair: Pair
-    k: int
-    predicted_map: float
-    reason: str
-
-
-class Record(BaseModel):
-    """A part of a model's JSON: no unknown key, no wrong type, no infinity."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class Offset(Record):
-    """What a pair is worth whatever the photo."""
-
-    pair: Pair
-    value: float
-
-
-class Equation(Record):
-    """Eq. 1 for one k. coefficients : of Kp, CSDi, CSCo, CSCl. offsets : none in Eq. 1 itself."""
-
-    k: K
-    coefficients: Four
-    offsets: tuple[Offset, ...] = ()
-
-    def value(self, pair: Pair, features: Complementarity) -> float:
-        """Evaluate it for a pair of a photo; a pair without an offset has 0."""
-        offset = sum(each.value for each in self.offsets if set(each.pair) == set(pair))
-        return offset + float(np.dot(self.coefficients, features.as_tuple()))
-
-
-class FixedScore(Record):
-    """Mean AP over the training queries of one pair and k for all of them."""
-
-    pair: Pair
-    k: K
-    mean_ap: float
-
-
-class Fitted(Record):
-    """Eq. 1 as fitted, and what it needs to know its limits.
-
-    equations : ascending k. lowest, highest : of each feature in training. fixed : best first.
+    terms : features that it looks at. per_k : each k has its own coefficients.
+    constants : none, one a k, or one a candidate. within : features and AP are differences from
+    their mean over a photo's candidates, since only what differs between them can decide.
+    averaged : one row a candidate, averaged over queries, as the paper says.
     """
 
-    equations: Annotated[tuple[Equation, ...], Field(min_length=1)]
-    lowest: Four
-    highest: Four
-    fixed: Annotated[tuple[FixedScore, ...], Field(min_length=1)]
+    name: VariantName
+    terms: tuple[str, ...]
+    per_k: bool
+    constants: Literal["none", "k", "candidate"]
+    within: bool = False
+    averaged: bool = False
+    ridge: float = 0.0
 
-    def predict(self, pair: Pair, features: Complementarity, k: int) -> float:
-        """Evaluate Eq. 1.
-
-        Raises
-        ------
-        WrongInput : not fitted for this k.
-        """
-        for equation in self.equations:
-            if equation.k == k:
-                return equation.value(pair, features)
-        known = ", ".join(str(equation.k) for equation in self.equations)
-        raise WrongInput(
-            f"the adaptive model knows k = {known}, not {k}; choose one of them, or give both "
-            "--pair and --k"
-        )
-
-    def choose(self, features: Mapping[Pair, Complementarity], ks: Sequence[int]) -> Choice:
-        """Pick the candidate of the highest predicted mAP'.
-
-        If its features lie outside those of training, the best fixed choice among the
-        candidates is taken instead, and the reason says so. Ties go to the earlier candidate.
-
-        Parameters
-        ----------
-        features : of the pairs that may be chosen: one if the user fixed it, else all.
-        ks : that may be chosen.
-
-        Raises
-        ------
-        WrongInput : no candidate, a k never fitted, or no fixed score among the candidates.
-        """
-        if not features or not ks:
-            raise WrongInput("the adaptive choice needs at least one pair and one k to choose from")
-        candidates = [
-            (self.predict(pair, of_pair, k), pair, k)
-            for pair, of_pair in features.items()
-            for k in ks
-        ]
-        predicted, pair, k = max(candidates, key=lambda candidate: candidate[0])
-        outside = self._outside(features[pair])
-        if not outside:
-            return Choice(pair, k, predicted, f"highest predicted mAP of {len(candidates)} choices")
-        best = self._best_fixed(features, ks)
-        return Choice(
-            best.pair,
-            best.k,
-            best.mean_ap,
-            f"fallback to the best fixed choice: {'-'.join(pair)} was predicted best, "
-            f"but in training {outside}",
-        )
-
-    def _outside(self, features: Complementarity) -> str:
-        """Name the features outside the training range; empty if none is."""
-        ranges = zip(FEATURES, features.as_tuple(), self.lowest, self.highest, strict=True)
-        return " and ".join(
-            f"{name} was {low:.3g} to {high:.3g}, here {value:.3g}"
-            for name, value, low, high in ranges
-            if not low <= value <= high
-        )
-
-    def _best_fixed(self, pairs: Iterable[Pair], ks: Sequence[int]) -> FixedScore:
-        as_asked = {frozenset(pair): pair for pair in pairs}
-        for score in self.fixed:
-            if frozenset(score.pair) in as_asked and score.k in ks:
-                return score.model_copy(update={"pair": as_asked[frozenset(score.pair)]})
-        raise WrongInput(
-            f"the adaptive model was never trained on "
-            f"{', '.join('-'.join(pair) for pair in as_asked.values())}; give both --pair and "
-            "--k, or run `flaneur train` on this index"
-        )
+    @property
+    def needs_look(self) -> bool:
+        """Whether rankings by every candidate must be made first."""
+        return bool(set(self.terms) & set(LOOK))
 
 
-def fit_equations(rows: Sequence[TrainingRow], variant: Variant = "eq1") -> Fitted:
-    """Fit Eq. 1 per k by least squares; rank the fixed choices. At least one row."""
-    by_k: dict[int, list[TrainingRow]] = defaultdict(list)
-    for row in rows:
-        by_k[row.k].append(row)
-    features = np.array([row.features.as_tuple() for row in rows])
-    return Fitted(
-        equations=tuple(_solved(by_k[k], k, variant) for k in sorted(by_k)),
-        lowest=_four(features.min(axis=0).tolist()),
-        highest=_four(features.max(axis=0).tolist()),
-        fixed=_fixed_scores(rows),
+VARIANTS: dict[VariantName, Variant] = {
+    variant.name: variant
+    for variant in (
+        Variant("fixed", (), per_k=False, constants="candidate", within=True),
+        Variant("eq1", COMPLEMENTARITY, per_k=True, constants="none"),
+        Variant("paper", COMPLEMENTARITY, per_k=True, constants="none", averaged=True),
+        Variant("kp_only", ("Kp",), per_k=True, constants="none"),
+        Variant("intercept", COMPLEMENTARITY, per_k=True, constants="k"),
+        Variant("offsets", COMPLEMENTARITY, per_k=False, constants="candidate", ridge=_RIDGE),
+        Variant(
+            "gain",
+            COMPLEMENTARITY,
+            per_k=False,
+            constants="candidate",
+            within=True,
+            ridge=_RIDGE,
+        ),
+        Variant(
+            "crowding",
+            COMPLEMENTARITY + CROWDING,
+            per_k=False,
+            constants="candidate",
+            within=True,
+            ridge=_RIDGE,
+        ),
+        Variant(
+            "look",
+            FEATURES,
+            per_k=False,
+            constants="candidate",
+            within=True,
+            ridge=_RIDGE,
+        ),
     )
+}
 
 
-def _solved(rows: Sequence[TrainingRow], k: int, variant: Variant) -> Equation:
-    pairs = sorted({row.pair for row in rows}) if variant == "pair_offsets" else []
-    features = np.array([row.features.as_tuple() for row in rows])
-    is_pair = np.array([[row.pair == pair for pair in pairs] for row in rows], dtype=np.float64)
-    known = np.hstack([features, is_pair.reshape(len(rows), len(pairs))])
-    solution = np.linalg.lstsq(known, np.array([row.ap for row in rows]), rcond=None)[0].tolist()
-    offsets = zip(pairs, solution[4:], strict=True)
-    return Equation(
-        k=k,
-        coefficients=_four(solution[:4]),
-        offsets=tuple(Offset(pair=pair, value=value) for pair, value in offsets),
-    )
+@dataclass(frozen=True, slots=True)
+class Column:
+    """What a coefficient belongs to: a term or `constant`, of one k or pair or of all (None)."""
+
+    term: str
+    k: int | None
+    pair: Pair | None
 
 
-def _four(values: Sequence[float]) -> Four:
-    a, b, c, d = values
-    return a, b, c, d
+@dataclass(frozen=True, slots=True)
+class Regression:
+    """A fitted variant. coefficients : (p,) in the order of `columns`.
+
+    level : mean AP where only differences are fitted, or coefficients shrink towards it; else 0.
+    """
+
+    variant: Variant
+    candidates: tuple[Candidate, ...]
+    coefficients: NDArray[np.float64]
+    level: float
+
+    def predict(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Predict mAP' of every candidate of every query: (n, c, f) -> (n, c) float64."""
+        rows = _design(self.variant, self.candidates, features)
+        return np.asarray(rows @ self.coefficients + self.level, dtype=np.float64)
 
 
-def _fixed_scores(rows: Sequence[TrainingRow]) -> tuple[FixedScore, ...]:
-    """Mean AP of every pair and k, best first; ties keep the rows' order."""
-    found: dict[tuple[Pair, int], list[float]] = defaultdict(list)
-    for row in rows:
-        found[row.pair, row.k].append(row.ap)
-    scores = [
-        FixedScore(pair=pair, k=k, mean_ap=sum(aps) / len(aps)) for (pair, k), aps in found.items()
+def columns(variant: Variant, candidates: Sequence[Candidate]) -> list[Column]:
+    """Name the coefficients of a variant in order."""
+    ks = sorted({k for _, k in candidates})
+    terms = [
+        Column(term, k, None) for term in variant.terms for k in (ks if variant.per_k else [None])
     ]
-    return tuple(sorted(scores, key=lambda score: -score.mean_ap))
+    if variant.constants == "k":
+        terms += [Column("constant", k, None) for k in ks]
+    if variant.constants == "candidate":
+        terms += [Column("constant", k, pair) for pair, k in candidates]
+    return terms
+
+
+def fit_regression(
+    trials: Trials, variant: Variant, times: NDArray[np.float64] | None = None
+) -> Regression:
+    """Fit by weighted least squares (ridge where the variant says so).
+
+    times : (n,), how often each query counts, not all 0; None: once.
+    """
+    weights = trials.weights() if times is None else trials.weights() * times
+    features, ap = trials.features, trials.ap
+    if variant.averaged:
+        features = np.average(features, axis=0, weights=weights)[np.newaxis]
+        ap, weights = np.average(ap, axis=0, weights=weights)[np.newaxis], np.ones(1)
+    anchored = variant.within or variant.ridge > 0
+    level = float(np.average(ap.mean(axis=1), weights=weights)) if anchored else 0.0
+    target = ap - (ap.mean(axis=1, keepdims=True) if variant.within else level)
+    rows = _design(variant, trials.candidates, features)
+    coefficients = _solved(
+        rows.reshape(-1, rows.shape[-1]),
+        target.ravel(),
+        np.repeat(weights, len(trials.candidates)),
+        variant.ridge,
+    )
+    return Regression(variant, trials.candidates, coefficients, level)
+
+
+def used_features(variant: Variant, features: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The terms as a variant sees them: (n, c, f) -> (n, c, t) float64."""
+    seen = features[..., [FEATURES.index(term) for term in variant.terms]]
+    if variant.within:
+        seen = seen - seen.mean(axis=1, keepdims=True)
+    return np.asarray(seen, dtype=np.float64)
+
+
+def _design(
+    variant: Variant, candidates: Sequence[Candidate], features: NDArray[np.float64]
+) -> _Rows:
+    seen = used_features(variant, features)
+    ks = np.array([k for _, k in candidates])
+    of_k = (ks[:, np.newaxis] == np.unique(ks)).astype(np.float64)
+    if variant.per_k:
+        seen = np.einsum("nct,ck->nctk", seen, of_k).reshape(*seen.shape[:2], -1)
+    if variant.constants == "none":
+        return np.asarray(seen, dtype=np.float64)
+    constants = of_k if variant.constants == "k" else np.eye(len(candidates))
+    if variant.within:
+        constants = constants - constants.mean(axis=0)
+    repeated = np.broadcast_to(constants, (len(seen), *constants.shape))
+    return np.concatenate([seen, repeated], axis=2)
+
+
+def _solved(rows: _Rows, target: _Rows, weights: _Rows, ridge: float) -> _Rows:
+    """Minimise the weighted squared error; ridge is per unit weight and unit variance."""
+    if not ridge:
+        root = np.sqrt(weights)
+        solution = np.linalg.lstsq(rows * root[:, np.newaxis], target * root, rcond=None)[0]
+        return np.asarray(solution, dtype=np.float64)
+    scale = np.sqrt(np.average(np.square(rows), axis=0, weights=weights)) + 1e-9
+    scaled = rows / scale
+    gram = (scaled * weights[:, np.newaxis]).T @ scaled / weights.sum()
+    moment = (scaled * weights[:, np.newaxis]).T @ target / weights.sum()
+    solution = np.linalg.solve(gram + ridge * np.eye(len(gram)), moment)
+    return np.asarray(solution / scale, dtype=np.float64)

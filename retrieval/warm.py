@@ -10,7 +10,7 @@ from retrieval.bag_of_words import score_bag_of_words
 from retrieval.channel_query import ChannelQuery
 from retrieval.codebooks import WordSearcher, build_search, train_codebook
 from retrieval.complementarity import complementarity
-from retrieval.fusion import fuse
+from retrieval.fusion import fuse, rank
 from retrieval.postings import (
     build_postings,
     distinct_words,
@@ -32,10 +32,11 @@ def compile_search_kernels() -> None:
     images = np.arange(_N, dtype=np.uint32) % 7
     postings = merge_postings([build_postings(words[:, 0], images, 5)] * 2)
     idf = inverse_document_frequency(document_frequency(postings), 7)
-    channel = ChannelQuery(words, distances, codebook.dmin, float(codebook.dmax[1]), postings, idf)
+    farthest = codebook.farthest(2, "range")
+    channel = ChannelQuery(words, distances, codebook.dmin, farthest, postings, idf)
     for vote in get_args(Vote):
         config = SearchConfig(vote=vote, weights=("idf", "norm", "burst"))
-        fuse([[channel, channel]], 7, config, distinct_words(postings, 7))
+        rank(fuse([[channel, channel]], 7, config, distinct_words(postings, 7)), 1)
     score_bag_of_words(words[:, 0], postings, idf, 7)
     frames = Frames(
         rng.random((_N, 2), dtype=np.float32) * 90,

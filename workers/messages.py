@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from contracts.config import Detector, SearchConfig
+from contracts.config import SearchConfig, Vote, Weight
 from contracts.errors import TaskFailed
 from index.jobs import JobFolder
 
@@ -80,7 +80,13 @@ class JudgeMessage(LocateMessage):
 
 
 class RehearseMessage(JudgeMessage):
-    """Every pair and k is tried, for training the choice."""
+    """Every detector, pair and k is tried, for training and comparing.
 
-    pairs: tuple[tuple[Detector, Detector], ...]
+    By each of `votes` with each of `weightings`; those of the search itself may be among them.
+    keep : a file where the votes of the single detectors by the search's own rule are left.
+    """
+
+    keep: str | None = None
+    votes: tuple[Vote, ...]
+    weightings: tuple[tuple[Weight, ...], ...]
     ks: tuple[int, ...]

@@ -73,7 +73,7 @@ def judge(message: object) -> Json:
 
 @_task("rehearse")
 def rehearse(message: object) -> Json:
-    from workers.stages.judge import rehearse_photo
+    from workers.stages.rehearse import rehearse_photo
 
     return rehearse_photo(messages.RehearseMessage.parse(message))
 

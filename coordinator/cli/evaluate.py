@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from contracts.errors import BadConfig
 from coordinator.cli.lists import (
     SOME_SKIPPED,
     Broker,
@@ -18,7 +19,7 @@ from coordinator.cli.lists import (
     Vote,
     Weights,
     Workers,
-    check_search,
+    fitted_search,
     search_config,
 )
 from coordinator.cli.outputs import result_folder, utf_8
@@ -34,16 +35,25 @@ def command(
     out: Annotated[Path | None, typer.Option(help="Folder for the report.")] = None,
     pair: Pair = "auto",
     k: K = "auto",
-    vote: Vote = "intersection",
+    vote: Vote = "auto",
     weights: Weights = "idf,norm",
     descriptors: Descriptors = None,
     workers: Workers = None,
     broker: Broker = None,
+    tables: Annotated[
+        bool,
+        typer.Option(
+            "--tables",
+            help="Also answer every query in every way: single detectors, pairs, late fusion, "
+            "every k and rule; the paper's tables with controls go to --out.",
+        ),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> int:
     """Search for every query of a ground truth and score the rankings."""
+    from coordinator.comparing.report import compare
     from coordinator.engine import running_engine
-    from coordinator.evaluating import report_of, table_of
+    from coordinator.evaluating import report_of, table_of, write_sheets
     from coordinator.export.files import write_whole
     from coordinator.querying import judge_queries
     from coordinator.truth import read_truth
@@ -51,8 +61,10 @@ def command(
 
     search = search_config(pair, k, vote, weights, descriptors, top=10)
     opened = OpenedIndex(index.absolute())
-    check_search(search, opened.config.features)
+    search = fitted_search(search, vote, opened.config.features)
     out = None if out is None else result_folder(out)
+    if tables and out is None:
+        raise BadConfig("--tables writes several files; name a folder with --out")
     catalogue = opened.catalogue
     queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
@@ -60,6 +72,9 @@ def command(
         answers = judge_queries(
             opened, queries, search, engine.follower, lambda: progress.advance("evaluate")
         )
+        if tables and out is not None:
+            name = truth.absolute().parent.name
+            compare(opened, queries, search, name, out, engine.follower, progress)
     for answer in answers:
         if "error" in answer:
             complain(f"{answer['query']}: {answer['error']}")
@@ -68,5 +83,7 @@ def command(
     if out is not None:
         write_whole(out / "report.json", utf_8(text))
         write_whole(out / "report.md", utf_8(table_of(report)))
+        with bars() as progress:
+            write_sheets(out / "index.html", report, answers, queries, opened, progress)
     typer.echo(utf_8(text if as_json else table_of(report)))
     return SOME_SKIPPED if report["unreadable"] else 0

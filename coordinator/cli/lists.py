@@ -17,6 +17,8 @@ from contracts.config import (
 from contracts.config import Vote as VoteName
 from contracts.errors import BadConfig
 
+DEFAULT_VOTE: VoteName = SearchConfig().vote
+
 SOME_SKIPPED = 3
 """Exit code: done, but some images were skipped."""
 
@@ -47,10 +49,15 @@ TruthRoot = Annotated[
     ),
 ]
 Pair = Annotated[
-    str, typer.Option(help="auto, two detectors such as hesaff,star, or one.", show_default=True)
+    str, typer.Option(help="auto, or one to six detectors such as hesaff,star.", show_default=True)
 ]
 K = Annotated[str, typer.Option("--k", help="Words per keypoint: auto, or 1 to 10.")]
-Vote = Annotated[str, typer.Option(help="union, intersection or pairwise.")]
+Vote = Annotated[
+    str,
+    typer.Option(
+        help="union, intersection, pairwise; or auto: pairwise, with one descriptor intersection."
+    ),
+]
 Weights = Annotated[str, typer.Option(help="Any of idf,norm,burst; '' for none.")]
 MaxFrames = Annotated[
     str | None,
@@ -116,26 +123,31 @@ def search_config(
     """
     if k not in {"auto", *map(str, range(1, MAX_NEIGHBOURS + 1))}:
         raise BadConfig(f"--k takes auto or a whole number from 1 to {MAX_NEIGHBOURS}; got {k!r}")
-    if vote not in get_args(VoteName):
-        raise BadConfig(f"--vote takes one of {', '.join(get_args(VoteName))}; got {vote!r}")
+    if vote not in {"auto", *get_args(VoteName)}:
+        raise BadConfig(f"--vote takes auto, {', '.join(get_args(VoteName))}; got {vote!r}")
     return SearchConfig.of(
         pair="auto" if pair == "auto" else names_among(pair, DETECTORS, "--pair"),
         k="auto" if k == "auto" else int(k),
-        vote=vote,
+        vote=DEFAULT_VOTE if vote == "auto" else vote,
         weights=names_among(weights, get_args(Weight), "--weights"),
         descriptors=names_among(descriptors, DESCRIPTORS, "--descriptors") or None,
         top=top,
     )
 
 
-def check_search(search: SearchConfig, indexed: FeatureConfig) -> None:
-    """Refuse a search for what was not indexed, before a worker is started for it.
+def fitted_search(search: SearchConfig, vote: str, indexed: FeatureConfig) -> SearchConfig:
+    """Fit a search to an index: settle `--vote auto`, refuse what was not indexed.
+
+    It happens before a worker is started.
 
     Raises
     ------
     BadConfig : names what is missing and what the index has.
     """
-    if search.vote == "pairwise" and len(search.descriptors or indexed.descriptors) < 2:
+    alone = len(search.descriptors or indexed.descriptors) < 2
+    if vote == "auto" and alone:
+        search = search.model_copy(update={"vote": "intersection"})
+    if search.vote == "pairwise" and alone:
         raise BadConfig(
             "--vote pairwise compares descriptors and there is only one here; "
             "use --vote intersection"
@@ -151,3 +163,4 @@ def check_search(search: SearchConfig, indexed: FeatureConfig) -> None:
                 f"{option}: the index has no {', '.join(missing)}; it was made with "
                 f"{', '.join(has)}. Choose from these or index again."
             )
+    return search

@@ -15,7 +15,7 @@ from coordinator.cli.lists import (
     Vote,
     Weights,
     Workers,
-    check_search,
+    fitted_search,
     search_config,
 )
 from coordinator.cli.outputs import result_file
@@ -31,7 +31,7 @@ def command(
     top: Annotated[int, typer.Option(help="Matches a photo.")] = 10,
     pair: Pair = "auto",
     k: K = "auto",
-    vote: Vote = "intersection",
+    vote: Vote = "auto",
     weights: Weights = "idf,norm",
     descriptors: Descriptors = None,
     workers: Workers = None,
@@ -46,7 +46,7 @@ def command(
 
     search = search_config(pair, k, vote, weights, descriptors, top)
     opened = OpenedIndex(index.absolute())
-    check_search(search, opened.config.features)
+    search = fitted_search(search, vote, opened.config.features)
     photos = list(dict.fromkeys(photos))  # globs overlap; a feature's id is of its photo's name
     out = None if out is None else result_file(out, map(Path, photos))
     count = min(workers or len(photos), len(photos)) if broker is None else None

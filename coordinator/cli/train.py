@@ -1,10 +1,12 @@
 """`flaneur train`: fit the adaptive choice of detectors and k to an index."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
+from contracts.config import VariantName
+from contracts.errors import BadConfig
 from coordinator.cli.lists import (
     SOME_SKIPPED,
     Broker,
@@ -15,13 +17,14 @@ from coordinator.cli.lists import (
     Vote,
     Weights,
     Workers,
-    check_search,
+    fitted_search,
     search_config,
 )
 from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
 
 NAME = "train"
+_VARIANTS: tuple[VariantName, ...] = get_args(VariantName)
 
 
 def command(
@@ -31,7 +34,14 @@ def command(
     out: Annotated[
         Path | None, typer.Option(help="Write the model here, not into the index.")
     ] = None,
-    vote: Vote = "intersection",
+    variant: Annotated[
+        str,
+        typer.Option(
+            help=f"Form of the regression: {', '.join(_VARIANTS)}; or auto: the one that does best "
+            "on places left out."
+        ),
+    ] = "auto",
+    vote: Vote = "auto",
     weights: Weights = "idf,norm",
     descriptors: Descriptors = None,
     workers: Workers = None,
@@ -40,25 +50,33 @@ def command(
     """Fit the model that chooses detectors and k for each photo (Eq. 1 of the paper)."""
     from coordinator.engine import running_engine
     from coordinator.export.files import write_whole
-    from coordinator.querying import rehearse_queries
+    from coordinator.querying import Rules, rehearse_queries
     from coordinator.training import train_model
     from coordinator.truth import read_truth
     from index.models import write_model
     from index.opened import OpenedIndex
-    from workers.stages.retrieve import KS
+    from workers.stages.choose import KS
 
     search = search_config("auto", "auto", vote, weights, descriptors, top=10)
     opened = OpenedIndex(index.absolute())
-    check_search(search, opened.config.features)
+    search = fitted_search(search, vote, opened.config.features)
     out = None if out is None else result_file(out, (truth,))
     catalogue = opened.catalogue
     queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
         progress.begin("train", len(queries), 0)
         answers = rehearse_queries(
-            opened, queries, search, KS, engine.follower, lambda: progress.advance("train")
+            opened,
+            queries,
+            search,
+            Rules.of(search),
+            KS,
+            engine.follower,
+            lambda: progress.advance("train"),
         )
-    model = train_model(answers, queries, opened, search, truth.absolute().parent.name)
+    model = train_model(
+        answers, queries, opened, search, truth.absolute().parent.name, _variants(variant)
+    )
     if out is None:
         write_model(opened.root, model)
     else:
@@ -67,6 +85,16 @@ def command(
     for answer in unreadable:
         complain(f"{answer['query']}: {answer['error']}")
     tell(model.summary())
-    if not model.is_worth_using:
-        complain("It does no better than one pair for all: `flaneur locate` will not use it.")
+    if model.variant == "fixed":
+        complain(
+            "Choosing for each photo did no better than one choice for all: `flaneur locate` will "
+            "use that."
+        )
     return SOME_SKIPPED if unreadable else 0
+
+
+def _variants(variant: str) -> list[VariantName]:
+    chosen = [name for name in _VARIANTS if variant in ("auto", name)]
+    if not chosen:
+        raise BadConfig(f"--variant takes auto or one of {', '.join(_VARIANTS)}; got {variant!r}")
+    return chosen

@@ -1,14 +1,10 @@
 """The result page: one HTML file with a map and every query beside its matches.
 
 It opens from the disk and asks no network for anything: the map library, the pictures and the
-data are inside, and a content security policy forbids the rest. Only the scripts whose hashes
-the policy names may run, so that no file name can.
+data are inside, and a content security policy forbids the rest.
 """
 
-import base64
-import hashlib
 import html
-import importlib.resources
 import importlib.util
 import json
 import re
@@ -18,6 +14,7 @@ from pathlib import Path
 from contracts.errors import FlaneurError
 from coordinator.export.files import write_whole
 from coordinator.export.sheets import QuerySheet, sheets_html, summary_html
+from coordinator.export.template import filled, own_text
 from geo.geojson import FeatureCollection
 
 LonLat = tuple[float, float]
@@ -56,13 +53,12 @@ def write_page(
         "track": list(track),
         "truth": [places.get(sheet.query) for sheet in sheets],
     }
-    page_js, library_js = _own("page.js"), _library("maplibre-gl.js")
+    page_js, library_js = own_text("page.js"), _library("maplibre-gl.js")
     parts = {
-        "policy": html.escape(_policy(library_js, page_js)),
         "title": html.escape(title),
         "summary": summary_html(sheets),
         "library_css": _library("maplibre-gl.css"),
-        "page_css": _own("page.css"),
+        "page_css": own_text("page.css"),
         "truth_key": '<li><i class="key truth"></i>true position</li>' if places else "",
         "sheets": sheets_html(sheets),
         "attribution": html.escape(attribution),
@@ -70,31 +66,12 @@ def write_page(
         "library_js": library_js,
         "page_js": page_js,
     }
-    page = re.sub(r"\{\{(\w+)\}\}", lambda slot: parts[slot.group(1)], _own("page.html"))
-    # A file name's byte that is no UTF-8 is shown as a question mark.
-    write_whole(out, page.encode(errors="replace"))
+    write_whole(out, filled("page.html", parts, library_js, page_js))
 
 
 def _json_for_script(data: object) -> str:
     """JSON that no text in it can end early: `<` is written as its escape."""
     return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-
-
-def _policy(*scripts: str) -> str:
-    hashes = " ".join(
-        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
-        for script in scripts
-    )
-    return (
-        "default-src 'none'; "
-        f"script-src {hashes}; "
-        "style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:; "
-        "base-uri 'none'; form-action 'none'"
-    )
-
-
-def _own(name: str) -> str:
-    return importlib.resources.files("coordinator.export").joinpath(name).read_text("utf-8")
 
 
 def _library(name: str) -> str:

@@ -1,20 +1,32 @@
-"""The part of the result page that shows each query beside what was found, as HTML text."""
+"""The part of a page that shows each query beside what was found, as HTML text."""
 
 import base64
 import html
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+
+from survey import decode_image
+
+BOX_RGB = (255, 196, 46)
+_JPEG_QUALITIES = (80, 65, 50, 35, 20)
 
 
 @dataclass(frozen=True, slots=True)
 class SheetMatch:
-    """One match as shown: `hit` is whether it is relevant, None when no truth is known."""
+    """One match as shown.
+
+    rank : None for junk, which has none. thumbnail_jpeg : None where the file is gone.
+    hit : whether it is relevant, None when no truth is known.
+    """
 
     image: str
-    rank: int
+    rank: int | None
     score: float
-    thumbnail_jpeg: bytes
+    thumbnail_jpeg: bytes | None
     hit: bool | None
 
 
@@ -34,6 +46,40 @@ class QuerySheet:
     matches: tuple[SheetMatch, ...]
     metres_from_truth: float | None
     right_facade: bool | None
+
+
+def thumbnail_jpeg(
+    path: str | Path,
+    side_px: int,
+    quarter_turns: int = 0,
+    box: tuple[float, float, float, float] | None = None,
+    max_bytes: int = 15_000,
+) -> bytes:
+    """A small JPEG of an image, upright.
+
+    Parameters
+    ----------
+    quarter_turns : counter-clockwise, after EXIF orientation.
+    box : x1 y1 x2 y2, pixels of the upright original; outlined.
+    max_bytes : the quality is lowered until it is met, or no lower is worth a look.
+
+    Raises
+    ------
+    UnusableImage : it is gone or cannot be read.
+    """
+    decoded = decode_image(path, quarter_turns=quarter_turns, max_side_px=side_px)
+    rgb = decoded.rgb.copy()
+    if box is not None:
+        # OpenCV's integers have 32 bits, and a truth may hold any number.
+        x1, y1, x2, y2 = (round(min(max(each / decoded.scale, -9), 9999)) for each in box)
+        cv2.rectangle(rgb, (x1, y1), (x2, y2), BOX_RGB, 2)
+    jpeg = b""
+    for quality in _JPEG_QUALITIES:
+        _, encoded = cv2.imencode(".jpg", rgb[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+        jpeg = encoded.tobytes()
+        if len(jpeg) <= max_bytes:
+            break
+    return jpeg
 
 
 def sheets_html(sheets: Sequence[QuerySheet]) -> str:
@@ -62,10 +108,10 @@ def _sheet(sheet: QuerySheet) -> str:
     chosen = f"{' + '.join(sheet.detectors)}, k = {sheet.k}"
     lines = [sheet.style, chosen] if sheet.style else [chosen]
     described = "".join(f"<span>{html.escape(line)}</span>" for line in lines)
-    matches = "\n".join(_match(match) for match in sheet.matches)
+    matches = "\n".join(match_html(match) for match in sheet.matches)
     return (
         '<article class="sheet"><button class="query" type="button">'
-        f'<img alt="the photo" src="{_jpeg_uri(sheet.photo_jpeg)}">'
+        f"{picture_html(sheet.photo_jpeg, 'the photo')}"
         f"<div><h2>{html.escape(sheet.query)}</h2>{described}{_verdict(sheet)}</div></button>\n"
         f'<ol class="matches">\n{matches}\n</ol></article>'
     )
@@ -84,26 +130,37 @@ def _verdict(sheet: QuerySheet) -> str:
     return f'<span class="verdict">{" · ".join(parts)}</span>' if parts else ""
 
 
-def _match(match: SheetMatch) -> str:
+def match_html(match: SheetMatch) -> str:
+    """One item of a list of matches, its name escaped."""
     css, mark = {
         True: ("hit", ' <b class="yes">✓ hit</b>'),
         False: ("miss", ' <b class="no">✗ miss</b>'),
         None: ("", ""),
     }[match.hit]
+    standing = "junk" if match.rank is None else str(match.rank)
     name = html.escape(match.image)
     # The isolate keeps a name whole where the style cuts its beginning instead of its end.
     return (
-        f'<li class="{css}"><img alt="match {match.rank}" loading="lazy" '
-        f'src="{_jpeg_uri(match.thumbnail_jpeg)}"><b>{match.rank}</b>{mark} {match.score:.3g}'
+        f'<li class="{css if match.rank else "junk"}">'
+        f"{picture_html(match.thumbnail_jpeg, f'match {standing}')}"
+        f"<b>{standing}</b>{mark} {_score(match.score)}"
         f'<span class="name" title="{name}"><bdi>{name}</bdi></span></li>'
     )
+
+
+def picture_html(jpeg: bytes | None, described: str) -> str:
+    """The picture inside the page, or a square that says that it is gone."""
+    if jpeg is None:
+        return '<div class="gone">no picture</div>'
+    uri = "data:image/jpeg;base64," + base64.b64encode(jpeg).decode("ascii")
+    return f'<img alt="{html.escape(described)}" loading="lazy" src="{uri}">'
+
+
+def _score(score: float) -> str:
+    return f"{score:,.0f}" if abs(score) >= 1000 else f"{score:.3g}"
 
 
 def _metres(metres: float) -> str:
     if metres >= 10_000:
         return f"{metres / 1000:,.0f} km"
     return f"{metres:.1f} m" if metres < 100 else f"{metres:,.0f} m"
-
-
-def _jpeg_uri(jpeg: bytes) -> str:
-    return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode("ascii")

@@ -24,7 +24,7 @@ def test_every_query_is_answered_three_ways(report: DemoReport) -> None:
     assert len(report.rows) == 4
     assert {row.query.style for row in report.rows} == {"sepia", "halftone", "engraving", "night"}
     for row in report.rows:
-        assert len(row.flaneur.detectors) == 2
+        assert 2 <= len(row.flaneur.detectors) <= 4
         assert row.plain.detectors == ("hesaff",)
         assert row.chance.metres is not None
 

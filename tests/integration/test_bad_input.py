@@ -190,10 +190,9 @@ def test_a_table_of_many_missing_images_is_summed_up(tmp_path: Path) -> None:
     [
         (("--pair", "hesaff,surf"), "--pair takes any of"),
         (("--pair", "hesaff,hesaff"), "names hesaff twice"),
-        (("--pair", "hesaff,star,mser"), "one detector or two"),
         (("--k", "0"), "from 1 to 10; got '0'"),
         (("--k", "²"), "from 1 to 10; got '²'"),
-        (("--vote", "most"), "union, intersection, pairwise; got 'most'"),
+        (("--vote", "most"), "--vote takes auto, union, intersection, pairwise; got 'most'"),
         (("--weights", "idf,tf"), "idf,norm,burst; got 'tf'"),
         (("--descriptors", "surf,orb"), "sift,surf,sc; got 'orb'"),
         (("--top", "0"), "top"),

@@ -1,20 +1,23 @@
 """From a ground truth on disk to judged rankings, through real workers."""
 
 from contextlib import nullcontext
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from contracts.config import CodebookConfig, Detector, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.cli.show import Bars
 from coordinator.engine import Engine
 from coordinator.indexing import run_job
 from coordinator.plan import make_plan, read_surveys
-from coordinator.querying import Json, judge_queries, rehearse_queries
+from coordinator.querying import Json, Rules, judge_queries, rehearse_queries, votes_file
 from coordinator.truth import read_truth
 from index.opened import OpenedIndex
+from index.votes import read_outcomes, read_votes
+from retrieval.ways import Way
 from survey import ReadOptions
 
 CONFIG = IndexConfig(
@@ -90,7 +93,9 @@ def test_a_box_outside_the_photo_is_that_querys_error(
     queries = read_truth(truth, two_places, opened.catalogue.column("uri"))
     for answer in (
         judged(truth, two_places, opened, engine),
-        *rehearse_queries(opened, queries, SEARCH, [2], engine.follower, lambda: None),
+        *rehearse_queries(
+            opened, queries, SEARCH, Rules.of(SEARCH), [2], engine.follower, lambda: None
+        ),
     ):
         assert answer["query"] == "place_1"
         assert (
@@ -123,3 +128,49 @@ def test_a_copy_of_an_indexed_image_does_not_find_itself(
 def test_images_are_found_by_the_digest_of_their_file(opened: OpenedIndex) -> None:
     digests = opened.catalogue.column("sha256")
     assert opened.images_by_sha256 == {digest: (n,) for n, digest in enumerate(digests)}
+
+
+def test_rehearsing_answers_every_way_as_a_search_of_its_own_does(
+    tmp_path: Path, small_survey: Path, opened: OpenedIndex, engine: Engine
+) -> None:
+    truth = tmp_path / "truth.json"
+    photo = np.asarray(Image.open(small_survey / "03.jpg"))
+    Image.fromarray(photo[:150, :200]).save(tmp_path / "part.png")
+    truth.write_text('{"part.png": ["03.jpg", "08.jpg"]}')
+    queries = read_truth(truth, None, opened.catalogue.column("uri"))
+    rules = Rules(("pairwise", "union"), (("idf", "norm"), ("idf",), ()))
+    (answer,) = rehearse_queries(
+        opened, queries, SEARCH, rules, [2, 5], engine.follower, lambda: None, tmp_path / "kept"
+    )
+    kept = votes_file(tmp_path / "kept", 0)
+    groups: tuple[tuple[Detector, ...], ...] = (("mser",), ("hesaff", "mser"))
+    answered = {each.way: each.scored for each in read_outcomes(kept)}
+    assert len(answered) == len(read_outcomes(kept))
+    for vote, weights, pair, k in product(rules.votes, rules.weightings, groups, (2, 5)):
+        search = SearchConfig.of(pair=pair, k=k, vote=vote, weights=weights)
+        (alone,) = judge_queries(opened, queries, search, engine.follower, lambda: None)
+        way = Way("single" if len(pair) == 1 else "fii", vote, weights, pair, k)
+        assert answered[way].ap == pytest.approx(alone["ap"])
+        assert answered[way].first_hit_rank == alone["first_hit_rank"]
+    own = [Way("fii", SEARCH.vote, SEARCH.weights, ("hesaff", "mser"), k) for k in (2, 5)]
+    assert [tuple(row[:3]) for row in answer["features"]] == [("hesaff", "mser", k) for k in (2, 5)]
+    assert answer["together"] == [[answered[own[0]].ap, None], [None, answered[own[1]].ap]]
+    votes = read_votes(kept, ("hesaff", "mser"), (2, 5))
+    assert all(len(scores.values) == 10 and scores.touched.any() for scores in votes.values())
+
+
+def test_rehearsing_for_training_leaves_nothing_on_disk(
+    tmp_path: Path, small_survey: Path, opened: OpenedIndex, engine: Engine
+) -> None:
+    truth = tmp_path / "truth.json"
+    photo = np.asarray(Image.open(small_survey / "03.jpg"))
+    Image.fromarray(photo[:150, :200]).save(tmp_path / "part.png")
+    truth.write_text('{"part.png": ["03.jpg"]}')
+    queries = read_truth(truth, None, opened.catalogue.column("uri"))
+    before = sorted(opened.root.rglob("*"))
+    (answer,) = rehearse_queries(
+        opened, queries, SEARCH, Rules.of(SEARCH), [2], engine.follower, lambda: None
+    )
+    (alone,) = judge_queries(opened, queries, SEARCH, engine.follower, lambda: None)
+    assert answer["together"] == [[pytest.approx(alone["ap"])]]
+    assert sorted(opened.root.rglob("*")) == before

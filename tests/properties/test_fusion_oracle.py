@@ -9,76 +9,72 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
-from contracts.config import SearchConfig
+from contracts.config import MAX_NEIGHBOURS, SearchConfig
+from retrieval.codebooks import Codebook
 from retrieval.fusion import ChannelQuery, Scores, full_ranking, fuse, rank
 from retrieval.postings import build_postings, document_frequency, inverse_document_frequency
 
 N_IMAGES = 9
+DISTINCT = np.arange(1, N_IMAGES + 1)
+Detectors = list[list[ChannelQuery]]
+Removed = NDArray[np.bool_]
 Word = tuple[float, float, list[int]]  # d', idf, images
 Cell = tuple[float, list[tuple[int, float]]]  # distance, occurrences (image, squared idf)
 
 
-@st.composite
-def channels_of_a_detector(draw: st.DrawFn, n_points: int, n_channels: int, k: int):  # type: ignore[no-untyped-def]
-    """Channels with few words, short lists, and distances that often tie."""
-    channels = []
-    for _ in range(n_channels):
-        n_words = draw(st.integers(1, 6))
-        pairs = draw(
-            st.lists(
-                st.tuples(st.integers(0, n_words - 1), st.integers(0, N_IMAGES - 1)), max_size=20
-            )
-        )
-        postings = build_postings(
-            np.array([word for word, _ in pairs], np.int32),
-            np.array([image for _, image in pairs], np.uint32),
-            n_words,
-        )
-        width = min(k, n_words)
-        words = [draw(st.permutations(range(n_words)))[:width] for _ in range(n_points)]
-        distance = st.lists(st.integers(0, 6), min_size=width, max_size=width).map(sorted)
-        distances = [draw(distance) for _ in range(n_points)]
-        dmin = draw(st.sampled_from([0.0, 1.0]))
-        channels.append(
-            ChannelQuery(
-                np.array(words, np.int32).reshape(n_points, width),
-                np.array(distances, np.float32).reshape(n_points, width),
-                dmin,
-                draw(st.sampled_from([dmin, 4.0, 6.0])),
-                postings,
-            )
-        )
-    return channels
-
-
-@st.composite
-def searches(draw: st.DrawFn):  # type: ignore[no-untyped-def]
-    """Detectors, a configuration that suits them, and which images are removed."""
-    n_channels, k = draw(st.integers(1, 3)), draw(st.integers(1, 4))
-    detectors = [
-        draw(channels_of_a_detector(draw(st.integers(0, 4)), n_channels, k))
-        for _ in range(draw(st.integers(1, 2)))
-    ]
-    votes = ["union", "walk", "intersection", *(["pairwise"] if n_channels > 1 else [])]
-    vote = draw(st.sampled_from(votes))
-    config = SearchConfig.of(
-        vote="union" if vote == "walk" else vote,
-        weights=tuple(draw(st.sets(st.sampled_from(["idf", "norm", "burst"])))),
-        max_images=draw(st.integers(1, 2 * N_IMAGES)) if vote == "walk" else None,
+def some_channel(rng: np.random.Generator, n_points: int, k: int, scale: str) -> ChannelQuery:
+    """A channel with few words, short lists, distances that often tie and some beyond dmax."""
+    n_words = int(rng.integers(1, k + 4))
+    n_postings = int(rng.integers(0, 4 * n_words + 1))
+    postings = build_postings(
+        rng.integers(0, n_words, n_postings).astype(np.int32),
+        rng.integers(0, N_IMAGES, n_postings).astype(np.uint32),
+        n_words,
     )
-    removed = np.array(draw(st.lists(st.booleans(), min_size=N_IMAGES, max_size=N_IMAGES)))
-    if draw(st.booleans()):
-        removed[:] = False
-    return detectors, config, removed
+    width = min(k, n_words)
+    words = rng.permuted(np.tile(np.arange(n_words), (n_points, 1)), axis=1)[:, :width]
+    distances = np.sort(rng.integers(0, 7, (n_points, width)), axis=1)
+    dmin = float(rng.choice([0.0, 1.0]))
+    dmax = np.full(MAX_NEIGHBOURS, rng.choice([dmin, 6.0]), np.float32)
+    codebook = Codebook(np.zeros((n_words, 1), np.uint8), dmin, dmax, np.minimum(dmax, 4))
+    return ChannelQuery(
+        words.astype(np.int32),
+        distances.astype(np.float32),
+        dmin,
+        codebook.farthest(k, "percentile" if scale == "percentile" else "range"),
+        postings,
+    )
 
 
-def with_idf(channel: ChannelQuery, removed) -> ChannelQuery:  # type: ignore[no-untyped-def]
+@st.composite
+def searches(draw: st.DrawFn) -> tuple[Detectors, SearchConfig, Removed]:
+    """Detectors, a configuration that suits them, and which images are removed."""
+    n_channels, k = draw(st.integers(1, 3)), draw(st.sampled_from([1, 2, 2, 3, 4, 5, 10]))
+    most_points = 4 if k < 10 else 1
+    points = draw(st.lists(st.integers(0, most_points), min_size=1, max_size=4))
+    vote = draw(st.sampled_from(["union", "intersection", *(["pairwise"] * (n_channels > 1))]))
+    scale = draw(st.sampled_from(["range", "percentile"]))
+    weights = tuple(name for name in ("idf", "norm", "burst") if draw(st.booleans()))
+    union = {}
+    if vote == "union":
+        limits = st.one_of(st.none(), st.integers(1, 2 * N_IMAGES))
+        distance = draw(st.sampled_from(["sum", "mean"]))
+        union = {"max_images": draw(limits), "union_distance": distance}
+    config = SearchConfig.of(vote=vote, weights=weights, distance_scale=scale, **union)
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    removed = rng.random(N_IMAGES) < draw(st.sampled_from([0.0, 0.4]))
+    detectors = [[some_channel(rng, n, k, scale) for _ in range(n_channels)] for n in points]
+    return [[with_idf(one, removed) for one in channels] for channels in detectors], config, removed
+
+
+def with_idf(channel: ChannelQuery, removed: Removed) -> ChannelQuery:
     df = document_frequency(channel.postings, removed)
     return replace(channel, idf=inverse_document_frequency(df, int((~removed).sum())))
 
 
-def words_of(channel: ChannelQuery, point: int, removed, use_idf: bool) -> list[Word]:  # type: ignore[no-untyped-def]
+def words_of(channel: ChannelQuery, point: int, removed: Removed, use_idf: bool) -> list[Word]:
     """A keypoint's words, nearest first: each image with its nearest word, no empty word."""
     found: set[int] = set()
     words = []
@@ -112,8 +108,10 @@ def joined(left: list[Cell], right: list[Cell], max_images: float) -> list[Cell]
     return cells
 
 
-def walked(lists: list[list[Word]], max_images: float) -> dict[int, float]:
+def walked(lists: list[list[Word]], config: SearchConfig) -> dict[int, float]:
     """Votes of one keypoint by the rule `union`."""
+    max_images = config.max_images or math.inf
+    share = len(lists) if config.union_distance == "mean" else 1
     as_cells = [
         [(distance, [(image, idf * idf) for image in images]) for distance, idf, images in words]
         for words in lists
@@ -124,7 +122,7 @@ def walked(lists: list[list[Word]], max_images: float) -> dict[int, float]:
     votes: dict[int, float] = defaultdict(float)
     for distance, occurrences in cells:
         for image, factor in occurrences:
-            votes[image] += (1 - distance) * factor
+            votes[image] += (1 - distance / share) * factor
     return votes
 
 
@@ -144,7 +142,7 @@ def multiplied(lists: list[list[Word]], vote: str) -> dict[int, float]:
     return votes
 
 
-def oracle(detectors, config: SearchConfig, distinct, removed) -> dict[int, float]:  # type: ignore[no-untyped-def]
+def oracle(detectors: Detectors, config: SearchConfig, removed: Removed) -> dict[int, float]:
     scores: dict[int, float] = defaultdict(float)
     for channels in detectors:
         score: dict[int, float] = defaultdict(float)
@@ -154,7 +152,7 @@ def oracle(detectors, config: SearchConfig, distinct, removed) -> dict[int, floa
             if not all(lists):
                 continue
             if config.vote == "union":
-                votes = walked(lists, config.max_images or math.inf)
+                votes = walked(lists, config)
             else:
                 votes = multiplied(lists, config.vote)
             for image, vote in votes.items():
@@ -164,7 +162,7 @@ def oracle(detectors, config: SearchConfig, distinct, removed) -> dict[int, floa
             burst = math.sqrt(voters[image]) if "burst" in config.weights else 1.0
             scores[image] += total / burst
     if "norm" in config.weights:
-        return {image: score / math.sqrt(distinct[image]) for image, score in scores.items()}
+        return {image: score / math.sqrt(DISTINCT[image]) for image, score in scores.items()}
     return scores
 
 
@@ -174,14 +172,14 @@ def assert_equal(got: Scores, expected: dict[int, float]) -> None:
         assert got.values[image] == pytest.approx(expected.get(image, 0.0), rel=1e-9, abs=1e-9)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=2500, deadline=None)
 @given(searches())
-def test_fusion_equals_the_literal_walk(search) -> None:  # type: ignore[no-untyped-def]
+def test_fusion_equals_the_literal_walk(
+    search: tuple[Detectors, SearchConfig, Removed],
+) -> None:
     detectors, config, removed = search
-    detectors = [[with_idf(channel, removed) for channel in one] for one in detectors]
-    distinct = np.arange(1, N_IMAGES + 1)
-    scores = fuse(detectors, N_IMAGES, config, distinct, removed)
-    assert_equal(scores, oracle(detectors, config, distinct, removed))
+    scores = fuse(detectors, N_IMAGES, config, DISTINCT, removed)
+    assert_equal(scores, oracle(detectors, config, removed))
 
     matches = rank(scores, None)
     by_hand = sorted(np.flatnonzero(scores.touched), key=lambda i: (-scores.values[i], i))
@@ -192,13 +190,13 @@ def test_fusion_equals_the_literal_walk(search) -> None:  # type: ignore[no-unty
     assert full_ranking(scores).tolist() == by_hand + rest
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=500, deadline=None)
 @given(searches())
-def test_a_removed_image_is_as_if_never_indexed(search) -> None:  # type: ignore[no-untyped-def]
+def test_a_removed_image_is_as_if_never_indexed(
+    search: tuple[Detectors, SearchConfig, Removed],
+) -> None:
     detectors, config, removed = search
-    detectors = [[with_idf(channel, removed) for channel in one] for one in detectors]
-    distinct = np.arange(1, N_IMAGES + 1)
-    compacted: list[list[ChannelQuery]] = []
+    compacted: Detectors = []
     for channels in detectors:
         compacted.append([])
         for one in channels:
@@ -207,19 +205,34 @@ def test_a_removed_image_is_as_if_never_indexed(search) -> None:  # type: ignore
             ids = one.postings.image_ids[kept]
             postings = build_postings(words[kept].astype(np.int32), ids, one.postings.n_words)
             compacted[-1].append(replace(one, postings=postings))
-    tombstoned = fuse(detectors, N_IMAGES, config, distinct, removed)
-    rebuilt = fuse(compacted, N_IMAGES, config, distinct)
+    tombstoned = fuse(detectors, N_IMAGES, config, DISTINCT, removed)
+    rebuilt = fuse(compacted, N_IMAGES, config, DISTINCT)
     assert tombstoned.values.tolist() == rebuilt.values.tolist()
     assert tombstoned.touched.tolist() == rebuilt.touched.tolist()
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.data(), st.integers(1, 3), st.integers(1, 4))
-def test_a_walk_that_never_reaches_t_equals_the_closed_form(data, n_channels, k) -> None:  # type: ignore[no-untyped-def]
-    detectors = [data.draw(channels_of_a_detector(4, n_channels, k))]
-    closed = fuse(detectors, N_IMAGES, SearchConfig(vote="union", weights=()))
-    walk = fuse(
-        detectors, N_IMAGES, SearchConfig(vote="union", weights=(), max_images=N_IMAGES + 1)
+@settings(max_examples=300, deadline=None)
+@given(searches())
+def test_a_walk_that_never_reaches_t_equals_the_closed_form(
+    search: tuple[Detectors, SearchConfig, Removed],
+) -> None:
+    detectors, config, removed = search
+    settings = {"vote": "union", "weights": config.weights, "union_distance": config.union_distance}
+    closed, walk = (
+        fuse(detectors, N_IMAGES, SearchConfig.of(max_images=t, **settings), DISTINCT, removed)
+        for t in (None, N_IMAGES + 1)
     )
     assert walk.touched.tolist() == closed.touched.tolist()
     assert walk.values == pytest.approx(closed.values, rel=1e-9, abs=1e-9)
+
+
+@settings(max_examples=300, deadline=None)
+@given(searches())
+def test_detectors_are_independent_of_each_other(
+    search: tuple[Detectors, SearchConfig, Removed],
+) -> None:
+    detectors, config, removed = search
+    together = fuse(detectors, N_IMAGES, config, DISTINCT, removed)
+    alone = [fuse([one], N_IMAGES, config, DISTINCT, removed) for one in detectors]
+    assert together.values == pytest.approx(sum(one.values for one in alone), rel=1e-9, abs=1e-9)
+    assert together.touched.tolist() == np.any([one.touched for one in alone], axis=0).tolist()

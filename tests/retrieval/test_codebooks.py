@@ -25,6 +25,7 @@ from retrieval.codebooks import (
 )
 
 SHA = hashlib.sha256(b"an image").hexdigest()
+FAR = np.ones(MAX_NEIGHBOURS, np.float32)
 
 
 def descriptors(n: int, dimensions: int = 36, seed: int = 0, top: int = 60) -> NDArray[np.uint8]:
@@ -47,7 +48,7 @@ def by_hand(
 
 
 def searcher(words: NDArray[np.uint8]) -> WordSearcher:
-    codebook = Codebook(words, 0.0, np.ones(MAX_NEIGHBOURS, np.float32))
+    codebook = Codebook(words, 0.0, FAR, FAR)
     return WordSearcher(codebook, build_search(words))
 
 
@@ -144,6 +145,7 @@ def test_training_twice_gives_the_same_words(
     assert first.words.dtype == np.uint8
     assert first.words.tobytes() == second.words.tobytes()
     assert first.dmax.tobytes() == second.dmax.tobytes()
+    assert first.d99.tobytes() == second.d99.tobytes()
     assert 0.95 * n_words <= len(first.words) <= n_words
     assert len(np.unique(first.words, axis=0)) == len(first.words)
 
@@ -166,13 +168,15 @@ def test_dmin_and_dmax_are_the_extreme_distances_to_the_kth_word() -> None:
     _, sq_dist = by_hand(sample, codebook.words, MAX_NEIGHBOURS)
     assert codebook.dmin == sq_dist[:, 0].min()
     assert codebook.dmax.tolist() == sq_dist.max(axis=0).tolist()
+    assert codebook.d99.tolist() == np.sort(sq_dist, axis=0)[395].tolist()  # 396 = 99 % of 400
+    assert codebook.farthest(3, "range") == sq_dist[:, 2].max() > codebook.farthest(3, "percentile")
 
 
 def test_a_codebook_of_few_words_repeats_its_last_distance() -> None:
     codebook = train_codebook(np.array([[0, 0], [0, 0], [9, 0]], np.uint8), 2, seed=0)
     assert codebook.words.tolist() == [[0, 0], [9, 0]]
     assert codebook.dmin == 0
-    assert codebook.dmax.tolist() == [0.0] + [81.0] * 9
+    assert codebook.dmax.tolist() == codebook.d99.tolist() == [0.0] + [81.0] * 9
 
 
 def test_a_channel_without_descriptors_gets_a_codebook_without_words() -> None:
@@ -281,7 +285,7 @@ def test_a_stored_structure_finds_the_same_words(large: WordSearcher) -> None:
 
 
 def test_a_structure_of_other_words_or_other_descriptors_is_refused() -> None:
-    codebook = Codebook(descriptors(10), 0.0, np.ones(MAX_NEIGHBOURS, np.float32))
+    codebook = Codebook(descriptors(10), 0.0, FAR, FAR)
     with pytest.raises(VocabularyMismatch, match="9 words"):
         WordSearcher(codebook, build_search(codebook.words[:9]))
     with pytest.raises(VocabularyMismatch, match="36"):

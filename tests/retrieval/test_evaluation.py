@@ -4,7 +4,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from contracts.errors import BadTruth
@@ -14,8 +14,10 @@ from retrieval.evaluation import (
     average_precision,
     first_hit_rank,
     judge,
+    judge_scores,
     summarise,
 )
+from retrieval.fusion import Scores, full_ranking
 
 
 def published_oxford(ranked_list: list[int], pos: set[int], amb: set[int]) -> float:
@@ -173,6 +175,43 @@ def test_a_judged_query_holds_all_its_scores() -> None:
     got = judge("a.jpg", [4, 7, 9], {7, 8}, {4}, ("hesaff", "star"), 5, 0.25)
     assert got == QueryResult("a.jpg", 0.5, 0.5, 1, 2, ("hesaff", "star"), 5, 0.25)
     assert judge("a.jpg", [4], {7}, set(), ("orb",), 2, 0.1).first_hit_rank is None
+
+
+@st.composite
+def scored(draw: st.DrawFn) -> tuple[Scores, set[int], set[int]]:
+    """Scores with ties, negative ones and untouched images; relevant and junk may overlap."""
+    n_images = draw(st.integers(1, 25))
+    values = draw(st.lists(st.integers(-2, 3), min_size=n_images, max_size=n_images))
+    touched = np.array(draw(st.lists(st.booleans(), min_size=n_images, max_size=n_images)))
+    ids = st.sampled_from(range(n_images))
+    relevant, junk = draw(st.sets(ids, min_size=1, max_size=8)), draw(st.sets(ids, max_size=8))
+    assume(relevant - junk)
+    return Scores(np.where(touched, np.array(values, dtype=float), 0.0), touched), relevant, junk
+
+
+@given(scored())
+@example((Scores(np.zeros(4), np.zeros(4, dtype=np.bool_)), {3}, {0}))
+@example((Scores(np.array([-1.0, 0.0]), np.array([True, False])), {1}, set()))
+def test_scores_are_judged_as_the_ranking_that_they_make(
+    case: tuple[Scores, set[int], set[int]],
+) -> None:
+    scores, relevant, junk = case
+    whole = judge("q", full_ranking(scores), relevant, junk, ("hesaff",), 2, 0.0)
+    found = judge_scores(scores, relevant, junk)
+    assert (found.ap, found.ap_10, found.first_hit_rank) == (
+        whole.ap,
+        whole.ap_10,
+        whole.first_hit_rank,
+    )
+
+
+def test_of_tied_scores_the_lower_id_is_first_and_junk_is_not_counted() -> None:
+    scores = Scores(np.array([5.0, 1.0, 1.0, 0.0]), np.array([True, True, True, False]))
+    assert judge_scores(scores, {2}, set()).first_hit_rank == 3
+    assert judge_scores(scores, {2}, {0, 3}).first_hit_rank == 2
+    assert judge_scores(scores, {3}, {0}).first_hit_rank == 3
+    with pytest.raises(BadTruth, match="exclude the query"):
+        judge_scores(scores, {2}, {2})
 
 
 def test_summary_averages_over_queries_and_counts_a_miss_as_nothing() -> None:

@@ -1,13 +1,22 @@
 """What late fusion of finished rankings does: by hand, and against a slow, obvious oracle."""
 
 from collections.abc import Callable, Sequence
+from statistics import median, pstdev
 
 import numpy as np
 import pytest
 
 from contracts.errors import WrongInput
 from retrieval.fusion import Scores, full_ranking
-from retrieval.late_fusion import LATE_FUSIONS, borda, comb_mnz, comb_sum, reciprocal_rank
+from retrieval.late_fusion import (
+    LATE_FUSIONS,
+    borda,
+    comb_mnz,
+    comb_sum,
+    reciprocal_rank,
+    standardised,
+    standardised_sum,
+)
 
 Fusion = Callable[[Sequence[Scores]], Scores]
 EACH = pytest.mark.parametrize("fuse", LATE_FUSIONS.values(), ids=LATE_FUSIONS.keys())
@@ -123,3 +132,75 @@ def test_systems_of_different_indexes_are_refused(fuse: Fusion) -> None:
         fuse([system(1, 2), system(1, 2, 3)])
     with pytest.raises(WrongInput, match="no system"):
         fuse([])
+
+
+def slow_standardised(one: Scores, image: int) -> float:
+    """In deviations of the crowd above its median, by sorting and the statistics module."""
+    values = sorted(one.values.tolist())
+    n_right = min(10, len(values) // 4)
+    crowd = values[: len(values) - n_right]
+    above = float(one.values[image]) - float(median(values))
+    deviation = float(pstdev(crowd))
+    return above / deviation if deviation > 0 else above
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_standardised_scores_are_deviations_above_the_median_of_the_crowd(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    one = random_system(rng, int(rng.integers(1, 80)))
+    found = standardised(one)
+    np.testing.assert_array_equal(found.touched, one.touched)
+    expected = [slow_standardised(one, image) for image in range(len(one.values))]
+    assert found.values == pytest.approx(expected, abs=1e-12)
+
+
+def test_standardising_by_hand() -> None:
+    # Of eight values the two best are left out; the others deviate by 1 from their mean of 1.
+    found = standardised(system(0, 2, 0, 2, 0, 2, 50, 90))
+    assert found.values.tolist() == [-2, 0, -2, 0, -2, 0, 48, 88]
+
+
+def test_what_the_best_ten_have_does_not_change_the_scale() -> None:
+    rng = np.random.default_rng(0)
+    values = rng.random(60)
+    found = standardised(Scores(values, np.ones(60, dtype=np.bool_)))
+    best = np.argsort(values)[-10:]
+    higher = values.copy()
+    higher[best] += 1000
+    lifted = standardised(Scores(higher, np.ones(60, dtype=np.bool_)))
+    others = np.setdiff1d(np.arange(60), best)
+    np.testing.assert_array_equal(lifted.values[others], found.values[others])
+    eleventh = others[np.argmax(values[others])]
+    higher[eleventh] += 1
+    assert not np.allclose(
+        standardised(Scores(higher, np.ones(60, dtype=np.bool_))).values[others[:5]],
+        found.values[others[:5]],
+    )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_joined_rankings_do_not_depend_on_the_scale_of_either(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = (Scores(rng.exponential(size=30), rng.random(30) < 0.9) for _ in range(2))
+    joined = standardised_sum([a, b])
+    scaled = standardised_sum([Scores(7 * a.values, a.touched), Scores(b.values / 9, b.touched)])
+    assert joined.values == pytest.approx(scaled.values)
+    swapped = standardised_sum([b, a])
+    np.testing.assert_array_equal(joined.values, swapped.values)
+    np.testing.assert_array_equal(joined.touched, a.touched | b.touched)
+    assert joined.values == pytest.approx(standardised(a).values + standardised(b).values)
+
+
+def test_a_crowd_without_spread_is_not_divided_by_it() -> None:
+    assert standardised(system(3, 3, 3, 3)).values.tolist() == [0, 0, 0, 0]
+    assert standardised(system(0, 0, 0, 0, 0, 0, 0, 5)).values.tolist() == [0] * 7 + [5]
+    assert standardised(system(7)).values.tolist() == [0]
+    nothing = Scores(np.zeros(0), np.zeros(0, dtype=np.bool_))
+    assert len(standardised(nothing).values) == 0
+
+
+def test_systems_of_different_indexes_have_no_standardised_sum() -> None:
+    with pytest.raises(WrongInput, match=r"\[2, 3\] images"):
+        standardised_sum([system(1, 2), system(1, 2, 3)])
+    with pytest.raises(WrongInput, match="no system"):
+        standardised_sum([])

@@ -1,140 +1,133 @@
-"""Who chooses the detectors and k, and what is said about it."""
+"""What a photo is read into, and that a search by parts is the fusion it stands for."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
-from index.models import read_model
-from retrieval.choice import ChoiceModel, TrainingRow, TrainingSet, fit
-from retrieval.complementarity import Complementarity
-from workers.stages import retrieve
-from workers.stages.retrieve import Photo, choose, read_photo
-
-
-class _Index:
-    """As much of an index as a choice looks at."""
-
-    root = Path("nowhere")
-    config = IndexConfig(
-        features=FeatureConfig(detectors=("hesaff", "mser", "star"), max_frames=100),
-        codebooks=CodebookConfig(max_words=10),
-    )
+from contracts.config import Detector, SearchConfig
+from contracts.errors import BadConfig
+from index.opened import OpenedIndex
+from retrieval.fusion import fuse, rank
+from retrieval.late_fusion import standardised_sum
+from workers.stages.retrieve import (
+    Chosen,
+    Photo,
+    channel_query,
+    densities,
+    detector_votes,
+    nearest_words,
+    open_index,
+    read_photo,
+    search_photo,
+    sizes_of,
+    words_of,
+)
 
 
 @pytest.fixture
-def photo(tmp_path: Path, small_survey: Path) -> Photo:
-    return read_photo(_Index(), str(small_survey / "00.jpg"))
+def photo(small_index: OpenedIndex, small_survey: Path) -> Photo:
+    return read_photo(small_index, str(small_survey / "03.jpg"))
 
 
-def a_model(photo: Photo, *, worth_using: bool) -> ChoiceModel:
-    """Star pairs are the better the higher CSDi; queries look like the photo."""
-    features = photo.complementarity(("hesaff", "mser", "star"))
-    rows = [
-        TrainingRow(
-            f"q{n}",
-            f"p{n}",
-            pair,
-            k,
-            Complementarity(*(value * (0.5 + n / 4) for value in each.as_tuple())),
-            0.9 if pair == ("mser", "star") and k == 5 else 0.2,
+def by_one_fusion(
+    index: OpenedIndex, photo: Photo, chosen: Chosen, search: SearchConfig
+) -> np.ndarray:
+    """The scores of one group by `fuse` of all its channels at once."""
+    detectors, names = [], []
+    for detector in chosen.detectors:
+        found = nearest_words(index, photo, detector, index.config.features.descriptors, chosen.k)
+        names += list(found)
+        detectors.append(
+            [channel_query(index, name, near, chosen.k, search) for name, near in found.items()]
         )
-        for n in range(5)
-        for pair, each in features.items()
-        for k in (2, 5, 10)
-    ]
-    model = fit(
-        rows,
-        detectors=("hesaff", "mser", "star"),
-        descriptors=("sift", "surf", "sc"),
-        vote="intersection",
-        weights=("idf", "norm"),
-        trained_on=(TrainingSet(set="made up", n_queries=5, n_places=5),),
-    )
-    fixed = model.left_out.adaptive - 0.1 if worth_using else model.left_out.adaptive
-    scores = model.left_out.model_copy(update={"best_fixed": fixed})
-    return model.model_copy(update={"left_out": scores})
+    return fuse(detectors, index.n_images, search, index.distinct_words(names)).values
 
 
-def chosen_with(
-    model: ChoiceModel | None,
-    photo: Photo,
-    search: SearchConfig,
-    monkeypatch: pytest.MonkeyPatch,
-) -> retrieve.Chosen:
-    monkeypatch.setattr(retrieve, "read_model", lambda _: model)
-    return choose(_Index(), photo, search)
-
-
-def test_only_frames_that_are_asked_for_are_found(
-    photo: Photo, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    chosen_with(None, photo, SearchConfig(), monkeypatch)
-    chosen_with(None, photo, SearchConfig(pair=("star", "mser"), k=2), monkeypatch)
+def test_only_frames_that_are_asked_for_are_found(photo: Photo) -> None:
     assert not photo.found
-    assert len(photo.frames("star")) > 0
+    assert 0 < len(photo.frames("star")) <= 100
     assert set(photo.found) == {"star"}
 
 
-def test_a_model_worth_using_chooses_and_predicts(
-    photo: Photo, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model = a_model(photo, worth_using=True)
-    chosen = chosen_with(model, photo, SearchConfig(), monkeypatch)
-    assert (set(chosen.detectors), chosen.k) == ({"mser", "star"}, 5)
-    assert chosen.predicted_map is not None
-    assert chosen.choice.startswith("highest predicted")
-
-
 @pytest.mark.parametrize(
-    ("worth_using", "search", "says"),
-    [
-        (False, SearchConfig(), "no better than one pair"),
-        (True, SearchConfig(vote="union"), "other descriptors, vote or weights"),
-    ],
+    "search",
+    [SearchConfig(), SearchConfig(weights=("norm",)), SearchConfig(vote="union", weights=("idf",))],
 )
-def test_otherwise_the_default_pair_is_used_and_says_why(
-    photo: Photo,
-    monkeypatch: pytest.MonkeyPatch,
-    worth_using: bool,
-    search: SearchConfig,
-    says: str,
+@pytest.mark.parametrize("group", [("star",), ("mser", "star"), ("hesaff", "mser", "star")])
+def test_a_search_is_one_fusion_of_all_its_channels(
+    small_index: OpenedIndex, photo: Photo, search: SearchConfig, group: tuple[Detector, ...]
 ) -> None:
-    model = a_model(photo, worth_using=worth_using)
-    chosen = chosen_with(model, photo, search, monkeypatch)
-    assert (chosen.detectors, chosen.k) == (("hesaff", "mser"), 2)
-    assert chosen.choice.startswith("default: ")
-    assert says in chosen.choice
+    chosen = Chosen((group,), 2, None, "given")
+    scores = search_photo(small_index, photo, chosen, search)
+    whole = by_one_fusion(small_index, photo, chosen, search)
+    assert scores.values == pytest.approx(whole, rel=1e-12)
 
 
-def test_a_model_does_not_judge_detectors_that_it_was_trained_without(
-    photo: Photo, monkeypatch: pytest.MonkeyPatch
+def test_an_indexed_photo_finds_itself(small_index: OpenedIndex, photo: Photo) -> None:
+    for groups in ((("mser",),), (("hesaff", "star"),), (("hesaff", "mser"), ("mser", "star"))):
+        scores = search_photo(small_index, photo, Chosen(groups, 2, None, ""), SearchConfig())
+        assert rank(scores, 1)[0].image_id == 3
+
+
+def test_two_groups_are_the_standardised_sum_of_their_rankings(
+    small_index: OpenedIndex, photo: Photo
 ) -> None:
-    model = a_model(photo, worth_using=True)
-    knows = model.model_copy(update={"detectors": ("hesaff", "mser")})
-    chosen = chosen_with(knows, photo, SearchConfig(), monkeypatch)
-    assert set(chosen.detectors) == {"hesaff", "mser"}
-    given = chosen_with(knows, photo, SearchConfig(pair=("mser", "star")), monkeypatch)
-    assert given.choice == "default: the model was trained without star"
+    search = SearchConfig()
+    groups: tuple[tuple[Detector, ...], ...] = (("hesaff", "mser"), ("hesaff", "star"))
+    both = Chosen(groups, 2, None, "given")
+    alone = [
+        search_photo(small_index, photo, Chosen((one,), 2, None, ""), search) for one in groups
+    ]
+    joined = search_photo(small_index, photo, both, search)
+    assert joined.values == pytest.approx(standardised_sum(alone).values)
+    assert both.detectors == ("hesaff", "mser", "star")
 
 
-def test_without_a_model_the_default_pair_is_used_and_says_so(
-    photo: Photo, monkeypatch: pytest.MonkeyPatch
+def test_fewer_words_a_keypoint_are_the_nearest_of_more(
+    small_index: OpenedIndex, photo: Photo
 ) -> None:
-    chosen = chosen_with(None, photo, SearchConfig(), monkeypatch)
-    assert chosen.choice == "default: no model"
+    search = SearchConfig()
+    several = words_of(small_index, photo, ("star",), 10, search)
+    for k in (2, 5, 10):
+        alone = words_of(small_index, photo, ("star",), k, search)
+        votes = [detector_votes(small_index, each, (k,), search) for each in (several, alone)]
+        np.testing.assert_array_equal(votes[0]["star", k].values, votes[1]["star", k].values)
 
 
-def test_what_the_user_gave_is_used(photo: Photo, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = a_model(photo, worth_using=True)
-    given = chosen_with(model, photo, SearchConfig(pair=("star", "hesaff"), k=7), monkeypatch)
-    assert (given.detectors, given.k, given.choice) == (("star", "hesaff"), 7, "given")
-    half = chosen_with(model, photo, SearchConfig(k=10), monkeypatch)
-    assert half.k == 10
+def test_votes_are_kept_without_norm(small_index: OpenedIndex, photo: Photo) -> None:
+    plain, normed = SearchConfig(weights=("idf",)), SearchConfig(weights=("idf", "norm"))
+    words = words_of(small_index, photo, ("star",), 2, plain)
+    votes = [detector_votes(small_index, words, (2,), each) for each in (plain, normed)]
+    np.testing.assert_array_equal(votes[0]["star", 2].values, votes[1]["star", 2].values)
+    assert sizes_of(small_index, ("star",), plain) is None
+    sizes = sizes_of(small_index, ("star",), normed)
+    assert sizes is not None
+    channels = ["star-sift", "star-surf", "star-sc"]
+    np.testing.assert_array_equal(sizes["star"], small_index.distinct_words(channels))
 
 
-def test_the_shipped_model_holds_and_says_what_it_was_trained_on(tmp_path: Path) -> None:
-    model = read_model(tmp_path)
-    assert model is not None
-    assert sum(each.n_queries for each in model.trained_on) == 144
-    assert all("synthetic town" in each.set for each in model.trained_on)
+def test_density_is_the_mean_share_of_the_images_that_a_word_is_in(
+    small_index: OpenedIndex,
+) -> None:
+    (found,) = densities(small_index, ("star",), SearchConfig(descriptors=("sift",))).values()
+    postings = small_index.postings("star-sift")
+    shares = np.diff(postings.indptr) / small_index.n_images
+    assert found == pytest.approx(shares.mean())
+    both = densities(small_index, ("star",), SearchConfig(descriptors=("sift", "sc")))["star"]
+    (other,) = densities(small_index, ("star",), SearchConfig(descriptors=("sc",))).values()
+    assert both == pytest.approx((found + other) / 2)
+
+
+def test_a_detector_that_was_not_indexed_is_refused_by_name(
+    small_index: OpenedIndex, photo: Photo
+) -> None:
+    with pytest.raises(BadConfig, match=r"no detector 'orb'; it was indexed with hesaff, mser"):
+        nearest_words(small_index, photo, "orb", ("sift",), 2)
+
+
+def test_an_index_that_was_written_to_in_between_is_refused(small_index: OpenedIndex) -> None:
+    root, number = str(small_index.root), small_index.generation.number
+    assert open_index(root, number).n_images == 10
+    with pytest.raises(BadConfig, match=f"at generation {number}, asked for {number + 1}"):
+        open_index(root, number + 1)

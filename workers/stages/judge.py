@@ -1,4 +1,4 @@
-"""Judge and rehearse: what the ranking of a photo is worth where the truth is known."""
+"""Judge: what the ranking of a photo is worth where the truth is known."""
 
 import time
 from dataclasses import asdict, replace
@@ -9,24 +9,24 @@ from numpy.typing import NDArray
 
 from contracts.errors import UnusableImage
 from index.opened import OpenedIndex
-from retrieval.evaluation import average_precision, judge
-from retrieval.fusion import full_ranking, fuse
+from retrieval.evaluation import judge
+from retrieval.fusion import full_ranking
 from survey import DecodedImage
-from workers.messages import JudgeMessage, RehearseMessage
+from workers.messages import JudgeMessage
+from workers.stages.choose import choose
 from workers.stages.retrieve import (
     Photo,
-    channel_query,
-    choose,
-    descriptors_of,
-    nearest_words,
     open_index,
     read_photo,
     search_photo,
 )
 
+SHOWN = 10
+"""Images of a judged ranking that are handed back, for people to look at."""
+
 
 def judge_photo(request: JudgeMessage) -> dict[str, Any]:
-    """AP and first hit of one query, as `evaluate --json` reports them.
+    """AP and first hit of one query, as `evaluate --json` reports them, and `top`, its best ten.
 
     The query itself, where it is indexed too, is junk, as in the Holidays package. The published
     program of Oxford and Paris counts it as found instead, since it is in the good list: every
@@ -38,61 +38,36 @@ def judge_photo(request: JudgeMessage) -> dict[str, Any]:
     started = time.perf_counter()
     index = open_index(request.index, request.generation)
     try:
-        photo = _read_query(index, request)
+        photo = read_query(index, request)
     except UnusableImage as error:
         return {"query": request.query, "error": str(error)}
     chosen = choose(index, photo, request.search)
-    ranking = full_ranking(search_photo(index, photo, chosen, request.search))
+    scores = search_photo(index, photo, chosen, request.search)
+    ranking = full_ranking(scores)
     seconds = time.perf_counter() - started
-    relevant, junk = set(request.relevant), _junk(index, photo, request)
+    relevant, junk = set(request.relevant), junk_of(index, photo, request)
     if not relevant - junk:
         return {"query": request.query, "excluded": True}
-    return asdict(
-        judge(request.query, ranking, relevant, junk, chosen.detectors, chosen.k, seconds)
-    )
+    result = judge(request.query, ranking, relevant, junk, chosen.detectors, chosen.k, seconds)
+    top = [
+        {
+            "image_id": image,
+            "score": float(scores.values[image]),
+            "hit": image in relevant - junk,
+            "junk": image in junk,
+        }
+        for image in ranking[:SHOWN].tolist()
+    ]
+    return {**asdict(replace(result, choice=chosen.choice)), "top": top}
 
 
-def rehearse_photo(request: RehearseMessage) -> dict[str, Any]:
-    """The AP of one training query with every pair and k, and each pair's complementarity."""
-    index = open_index(request.index, request.generation)
-    try:
-        photo = _read_query(index, request)
-    except UnusableImage as error:
-        return {"query": request.query, "error": str(error)}
-    relevant, junk = set(request.relevant), _junk(index, photo, request)
-    if not relevant - junk:
-        return {"query": request.query, "excluded": True}
-    descriptors = descriptors_of(index, request.search)
-    used = sorted({name for pair in request.pairs for name in pair})
-    nearest = {
-        name: nearest_words(index, photo, name, descriptors, max(request.ks)) for name in used
-    }
-    features = photo.complementarity(index.config.features.detectors)
-    rows = []
-    for pair in request.pairs:
-        channels = [f"{det}-{desc}" for det in pair for desc in descriptors]
-        distinct = index.distinct_words(channels) if "norm" in request.search.weights else None
-        for k in request.ks:
-            queries = [
-                [
-                    channel_query(index, name, found, k, request.search)
-                    for name, found in nearest[detector].items()
-                ]
-                for detector in pair
-            ]
-            ranking = full_ranking(fuse(queries, index.n_images, request.search, distinct))
-            rows.append(
-                {
-                    "pair": pair,
-                    "k": k,
-                    "ap": average_precision(ranking, relevant, junk),
-                    "features": asdict(features[pair]),
-                }
-            )
-    return {"query": request.query, "rows": rows}
+def read_query(index: OpenedIndex, request: JudgeMessage) -> Photo:
+    """Decode a query; only what lies in its box is usable.
 
-
-def _read_query(index: OpenedIndex, request: JudgeMessage) -> Photo:
+    Raises
+    ------
+    UnusableImage : it cannot be read, or its box lies outside.
+    """
     photo = read_photo(index, request.path)
     if request.box is None:
         return photo
@@ -114,6 +89,6 @@ def _inside(box: tuple[float, float, float, float], decoded: DecodedImage) -> ND
     return inside
 
 
-def _junk(index: OpenedIndex, photo: Photo, request: JudgeMessage) -> set[int]:
+def junk_of(index: OpenedIndex, photo: Photo, request: JudgeMessage) -> set[int]:
     """What the truth calls junk, and the query itself where it is indexed too."""
     return {*request.junk, *index.images_by_sha256.get(photo.decoded.sha256, ())}

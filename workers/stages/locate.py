@@ -9,18 +9,18 @@ from index.opened import OpenedIndex
 from retrieval.bag_of_words import score_bag_of_words
 from retrieval.fusion import Scores, rank
 from workers.messages import LocateMessage
+from workers.stages.choose import choose
 from workers.stages.place import ESTIMATE_FROM, place
 from workers.stages.retrieve import (
     Chosen,
     Photo,
-    choose,
     nearest_words,
     open_index,
     read_photo,
     search_photo,
 )
 
-PLAIN = Chosen(("hesaff",), 1, None, "baseline: bag of words")
+PLAIN = Chosen((("hesaff",),), 1, None, "baseline: bag of words")
 
 
 def locate_photo(request: LocateMessage) -> dict[str, Any]:

@@ -1,6 +1,6 @@
-"""Retrieve: a photo, a choice of detectors and k, and the fusion of their inverted indices."""
+"""Retrieve: a photo, its words, and the fusion of their inverted indices."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -12,21 +12,18 @@ from numpy.typing import NDArray
 from contracts.config import Descriptor, Detector, FeatureConfig, IndexConfig, SearchConfig
 from contracts.errors import BadConfig
 from contracts.records import Frames
-from index.models import read_model
 from index.opened import OpenedIndex
-from retrieval.choice import Choice, ChoiceModel
 from retrieval.complementarity import Complementarity, all_pairs
 from retrieval.descriptors import describe
 from retrieval.detectors import detect
 from retrieval.fusion import ChannelQuery, Scores, fuse
+from retrieval.late_fusion import standardised_sum
 from retrieval.pyramid import Pyramid, build_pyramid
+from retrieval.ways import joined_votes
 from survey import DecodedImage, decode_image
 
-DEFAULT_PAIR: tuple[Detector, Detector] = ("hesaff", "mser")
-"""The pair where no model chooses (docs/decisions/0006)."""
-DEFAULT_K = 2
-KS = (2, 5, 10)
-"""What `--k auto` chooses from, as in the paper's Table IV."""
+WordsFound = dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]
+"""By channel of one detector: word ids (n, k) and their squared distances (n, k)."""
 
 
 class Configured(Protocol):
@@ -97,61 +94,20 @@ def read_photo(index: Configured, path: str) -> Photo:
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """What a photo is searched with, and how that came to be."""
+    """What a photo is searched with, and how that came to be.
 
-    detectors: tuple[Detector, ...]
+    groups : the detectors that are fused; of two groups the finished rankings are joined.
+    """
+
+    groups: tuple[tuple[Detector, ...], ...]
     k: int
     predicted_map: float | None
     choice: str
 
-
-def choose(index: Configured, photo: Photo, search: SearchConfig) -> Chosen:
-    """Settle the detectors and k: as given, by the model, or the default that says so."""
-    if search.pair != "auto" and search.k != "auto":
-        return Chosen(search.pair, search.k, None, "given")
-    if search.pair != "auto" and len(search.pair) == 1:
-        return Chosen(search.pair, DEFAULT_K, None, "given; k by default: models choose for pairs")
-    model, why_not = usable_model(index, search)
-    if model is None:
-        pair = search.pair if search.pair != "auto" else default_pair(index)
-        k = search.k if search.k != "auto" else DEFAULT_K
-        return Chosen(pair, k, None, f"default: {why_not}")
-    features = photo.complementarity(model.detectors)
-    if search.pair != "auto":
-        wanted = set(search.pair)
-        features = {pair: scores for pair, scores in features.items() if set(pair) == wanted}
-    made: Choice = model.choose(features, KS if search.k == "auto" else (search.k,))
-    return Chosen(made.pair, made.k, made.predicted_map, made.reason)
-
-
-def default_pair(index: Configured) -> tuple[Detector, ...]:
-    """The default pair, or the first detectors of an index that lacks one of it."""
-    detectors = index.config.features.detectors
-    return DEFAULT_PAIR if set(DEFAULT_PAIR) <= set(detectors) else detectors[:2]
-
-
-def usable_model(index: Configured, search: SearchConfig) -> tuple[ChoiceModel | None, str]:
-    """The index's own model, or the shipped one, if it fits this search and is worth it."""
-    model = read_model(index.root)
-    if model is None:
-        return None, "no model"
-    missing = set(model.detectors) - set(index.config.features.detectors)
-    if missing:
-        return None, f"the model also wants {', '.join(sorted(missing))}"
-    untrained = set(() if search.pair == "auto" else search.pair) - set(model.detectors)
-    if untrained:
-        return None, f"the model was trained without {', '.join(sorted(untrained))}"
-    trained = (model.descriptors, model.vote, model.weights)
-    asked = (descriptors_of(index, search), search.vote, tuple(sorted(search.weights)))
-    if trained != asked:
-        return None, "the model was trained with other descriptors, vote or weights"
-    if not model.is_worth_using:
-        scores = model.left_out
-        return None, (
-            f"on places left out the model ({scores.adaptive:.3f}) is no better than one pair "
-            f"for all ({scores.best_fixed:.3f})"
-        )
-    return model, ""
+    @property
+    def detectors(self) -> tuple[Detector, ...]:
+        """Every detector that is searched with, once."""
+        return tuple(dict.fromkeys(name for group in self.groups for name in group))
 
 
 def descriptors_of(index: Configured, search: SearchConfig) -> tuple[Descriptor, ...]:
@@ -165,7 +121,7 @@ def nearest_words(
     detector: Detector,
     descriptors: Sequence[Descriptor],
     k: int,
-) -> dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]:
+) -> WordsFound:
     """Describe one detector's frames and find their k nearest words, by channel."""
     if detector not in photo.config.detectors:
         raise BadConfig(
@@ -192,21 +148,79 @@ def channel_query(
         word_ids=np.ascontiguousarray(nearest[0][:, :k]),
         sq_dist=np.ascontiguousarray(nearest[1][:, :k]),
         dmin=codebook.dmin,
-        dmax=float(codebook.dmax[k - 1]),
+        dmax=codebook.farthest(k, search.distance_scale),
         postings=index.postings(channel),
         idf=index.idf(channel) if "idf" in search.weights else None,
     )
 
 
+def densities(
+    index: OpenedIndex, detectors: Sequence[Detector], search: SearchConfig
+) -> dict[Detector, float]:
+    """By detector, the mean share of the images that one of its words is in."""
+    return {
+        name: index.density([f"{name}-{each}" for each in descriptors_of(index, search)])
+        for name in detectors
+    }
+
+
+def sizes_of(
+    index: OpenedIndex, detectors: Sequence[Detector], search: SearchConfig
+) -> dict[Detector, NDArray[np.int64]] | None:
+    """By detector, the distinct words of each image, where the weight `norm` wants them."""
+    if "norm" not in search.weights:
+        return None
+    return {
+        name: index.distinct_words([f"{name}-{each}" for each in descriptors_of(index, search)])
+        for name in detectors
+    }
+
+
+def words_of(
+    index: OpenedIndex,
+    photo: Photo,
+    detectors: Sequence[Detector],
+    k: int,
+    search: SearchConfig,
+) -> dict[Detector, WordsFound]:
+    """Describe the frames of some detectors and find their k nearest words."""
+    descriptors = descriptors_of(index, search)
+    return {name: nearest_words(index, photo, name, descriptors, k) for name in detectors}
+
+
+def detector_votes(
+    index: OpenedIndex,
+    words: Mapping[Detector, WordsFound],
+    ks: Sequence[int],
+    search: SearchConfig,
+) -> dict[tuple[Detector, int], Scores]:
+    """Search with each detector alone and every k; scores before `norm`.
+
+    words : as many a keypoint as the largest k, or more.
+    """
+    without_norm = search.model_copy(
+        update={"weights": tuple(each for each in search.weights if each != "norm")}
+    )
+    votes = {}
+    for detector, found in words.items():
+        for k in ks:
+            channels = [
+                channel_query(index, name, nearest, k, search) for name, nearest in found.items()
+            ]
+            votes[detector, k] = fuse([channels], index.n_images, without_norm)
+    return votes
+
+
 def search_photo(index: OpenedIndex, photo: Photo, chosen: Chosen, search: SearchConfig) -> Scores:
     """Score every image of the index for a photo."""
-    descriptors = descriptors_of(index, search)
-    queries = []
-    for detector in chosen.detectors:
-        nearest = nearest_words(index, photo, detector, descriptors, chosen.k)
-        queries.append(
-            [channel_query(index, name, found, chosen.k, search) for name, found in nearest.items()]
+    words = words_of(index, photo, chosen.detectors, chosen.k, search)
+    votes = detector_votes(index, words, (chosen.k,), search)
+    sizes = sizes_of(index, chosen.detectors, search)
+    rankings = [
+        joined_votes(
+            [votes[name, chosen.k] for name in group],
+            None if sizes is None else [sizes[name] for name in group],
         )
-    channels = [f"{det}-{desc}" for det in chosen.detectors for desc in descriptors]
-    distinct = index.distinct_words(channels) if "norm" in search.weights else None
-    return fuse(queries, index.n_images, search, distinct)
+        for group in chosen.groups
+    ]
+    return rankings[0] if len(rankings) == 1 else standardised_sum(rankings)

@@ -1,0 +1,1 @@
+"""The sets that fusion and the choice are judged on: real photos, and towns in four restylings."""

@@ -1,0 +1,1 @@
+"""Comparing: rehearsed queries become the paper's tables, with controls and intervals."""

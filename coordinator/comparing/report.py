@@ -1,0 +1,99 @@
+"""The report of a comparison: tables as Markdown and CSV, figures as PNG."""
+
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from contracts.config import SearchConfig
+from coordinator.comparing import paper
+from coordinator.comparing.choices import Choices, choices_of
+from coordinator.comparing.results import Results, results_of
+from coordinator.comparing.summary import chosen_shares, rules_table, summary_tables
+from coordinator.comparing.tables import paper_tables
+from coordinator.export.figures import draw_intervals, draw_shares
+from coordinator.export.files import write_whole
+from coordinator.export.tables import write_tables
+from coordinator.follow import Follower
+from coordinator.indexing import Progress
+from coordinator.querying import Rules, rehearse_queries
+from coordinator.truth import JudgedQuery
+from index.opened import OpenedIndex
+from workers.stages.choose import KS
+
+TITLE = "Fusion and the choice of detectors, measured"
+
+
+def compare(
+    index: OpenedIndex,
+    queries: Sequence[JudgedQuery],
+    search: SearchConfig,
+    set_name: str,
+    out: Path,
+    follower: Follower,
+    progress: Progress,
+) -> None:
+    """Have every query answered in every way, and write the report of it into a folder.
+
+    Raises
+    ------
+    WrongInput : no query can be judged, all are of one place, or nothing can be written there.
+    """
+    n_descriptors = len(search.descriptors or index.config.features.descriptors)
+    rules = Rules.all_for(n_descriptors)
+    # Workers elsewhere share the index with us, and not the report's folder.
+    votes = index.root / "rehearsals" / f"{os.getpid()}"
+    progress.begin("tables", len(queries), 0)
+    try:
+        answers = rehearse_queries(
+            index, queries, search, rules, KS, follower, lambda: progress.advance("tables"), votes
+        )
+        sets = [set_name] * len(queries)
+        write_comparison(out, results_of(answers, queries, index, search, sets, votes))
+    finally:
+        shutil.rmtree(votes, ignore_errors=True)
+
+
+def write_comparison(out: Path, results: Results) -> Choices:
+    """Write `tables.md`, a CSV a table, and the figures into a folder.
+
+    Returns
+    -------
+    The choices, made without each query's place.
+
+    Raises
+    ------
+    WrongInput : the queries are all of one place, or nothing can be written there.
+    """
+    made = choices_of(results.trials, results.trials.places)
+    everything = np.ones(len(results.trials.queries), dtype=np.bool_)
+    tables = [
+        *paper_tables(results, made, everything),
+        *summary_tables(results, made),
+        rules_table(results),
+    ]
+    sets, counts = np.unique(results.trials.sets, return_counts=True)
+    queries = ", ".join(f"{name} {count}" for name, count in zip(sets, counts, strict=True))
+    write_tables(
+        out,
+        TITLE,
+        tables,
+        f"Queries: {queries}. In brackets bootstrap 95 % intervals, places drawn as a whole. "
+        "[paper]: Bhowmik et al., JURSE 2017, on data that we do not have: for proportions.",
+    )
+    by_name = {table.name: table for table in tables}
+    write_whole(
+        out / "table-1.png",
+        draw_intervals(
+            by_name["table-1"], "measured mAP", "pair", paper=f"mAP' {paper.PARIS} [paper]"
+        ),
+    )
+    write_whole(out / "controls.png", draw_intervals(by_name["controls"], "mAP", "choice"))
+    write_whole(out / "sets.png", draw_intervals(by_name["sets"], "mAP", "way", group="set"))
+    differences = draw_intervals(by_name["differences"], "mAP", "difference", group="set")
+    write_whole(out / "differences.png", differences)
+    panels = chosen_shares(results, made, paper.SHARE_OF_K_2[0])
+    write_whole(out / "figure-2.png", draw_shares("Chosen by Eq. 1, place left out", panels))
+    return made

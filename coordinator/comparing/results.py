@@ -1,0 +1,155 @@
+"""How every way of searching answered every query, as arrays."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import compress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contracts.config import SearchConfig, Vote, Weight
+from coordinator.querying import votes_file
+from coordinator.training import places_of, trials_of
+from coordinator.truth import JudgedQuery
+from index.opened import OpenedIndex
+from index.votes import read_outcomes, read_votes
+from retrieval.evaluation import judge_scores
+from retrieval.fusion import Scores
+from retrieval.resampling import Interval, bootstrap_mean
+from retrieval.score_curves import N_CURVE, Reference, query_adaptive, reference_curves
+from retrieval.trials import Trials, joined
+from retrieval.ways import Votes, Way, joined_votes
+from workers.stages.retrieve import sizes_of
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """All ways on all queries of one set or of several.
+
+    rule : of the search itself, by which `trials`, what the choice is learnt from, were made.
+    ap, ap_10 : (n, w) float64 of every way.
+    query_adaptive : k -> (n,) AP of Zheng et al.'s late fusion of all detectors.
+    """
+
+    trials: Trials
+    rule: tuple[Vote, tuple[Weight, ...]]
+    ways: tuple[Way, ...]
+    ap: NDArray[np.float64]
+    ap_10: NDArray[np.float64]
+    query_adaptive: Mapping[int, NDArray[np.float64]]
+
+    def of_set(self, name: str) -> NDArray[np.bool_]:
+        """Which queries are of a set; (n,) bool."""
+        return np.asarray(self.trials.sets == name, dtype=np.bool_)
+
+    def mean(self, values: NDArray[np.float64], rows: NDArray[np.bool_]) -> Interval:
+        """Mean of some queries, weighed as in training, and its interval over places."""
+        chosen = self.trials.take(rows)
+        return bootstrap_mean(values[rows] * chosen.weights(), chosen.places)
+
+
+def results_of(
+    answers: Sequence[Json],
+    queries: Sequence[JudgedQuery],
+    index: OpenedIndex,
+    search: SearchConfig,
+    set_names: Sequence[str],
+    votes_folder: Path,
+    prefix: str = "",
+) -> Results:
+    """Read what rehearsing gave.
+
+    Parameters
+    ----------
+    answers, set_names : of `queries`, in their order. votes_folder : where rehearsing left votes
+    and outcomes.
+    prefix : of places, which are told apart within one index only.
+
+    Raises
+    ------
+    WrongInput : no query could be judged.
+    """
+    judged = ["together" in answer for answer in answers]
+    places = {query: prefix + place for query, place in places_of(queries).items()}
+    trials = trials_of(answers, places, set_names)
+    files = [votes_file(votes_folder, at) for at in np.flatnonzero(judged).tolist()]
+    outcomes = [read_outcomes(file) for file in files]
+    return Results(
+        trials=trials,
+        rule=(search.vote, tuple(sorted(search.weights))),
+        ways=tuple(each.way for each in outcomes[0]),
+        ap=np.array([[each.scored.ap for each in row] for row in outcomes]),
+        ap_10=np.array([[each.scored.ap_10 for each in row] for row in outcomes]),
+        query_adaptive=_query_adaptive(
+            list(compress(answers, judged)),
+            trials,
+            index,
+            search,
+            files,
+        ),
+    )
+
+
+def joined_results(parts: Sequence[Results]) -> Results:
+    """Put the queries of several indices together; all were answered in the same ways."""
+    return Results(
+        trials=joined([part.trials for part in parts]),
+        rule=parts[0].rule,
+        ways=parts[0].ways,
+        ap=np.concatenate([part.ap for part in parts]),
+        ap_10=np.concatenate([part.ap_10 for part in parts]),
+        query_adaptive={
+            k: np.concatenate([part.query_adaptive[k] for part in parts])
+            for k in parts[0].query_adaptive
+        },
+    )
+
+
+def _query_adaptive(
+    answers: Sequence[Json],
+    trials: Trials,
+    index: OpenedIndex,
+    search: SearchConfig,
+    files: Sequence[Path],
+) -> dict[int, NDArray[np.float64]]:
+    """AP of query-adaptive late fusion; its reference curves come from queries of other places."""
+    detectors = index.config.features.detectors
+    ks = tuple(sorted({k for _, k in trials.candidates}))
+    found: dict[int, list[float]] = {k: [] for k in ks}
+    for k in ks:
+        systems = [_alone(read_votes(file, detectors, (k,)), index, search, k) for file in files]
+        curves = [
+            [_wrong_curve(scores, answer) for scores in alone]
+            for alone, answer in zip(systems, answers, strict=True)
+        ]
+        for number, answer in enumerate(answers):
+            others = np.flatnonzero(trials.places != trials.places[number]).tolist()
+            references = [
+                Reference(np.concatenate([curves[other][at] for other in others]))
+                for at in range(len(detectors))
+            ]
+            fused = query_adaptive(systems[number], references)
+            found[k].append(judge_scores(fused, answer["relevant"], answer["junk"]).ap)
+    return {k: np.array(values) for k, values in found.items()}
+
+
+def _wrong_curve(scores: Scores, answer: Json) -> NDArray[np.float64]:
+    """The score curve of what is known to be wrong, (1, n_curve); none if nothing else is there."""
+    known = {*answer["relevant"], *answer["junk"]}
+    if not np.delete(scores.touched, sorted(known)).any():
+        return np.empty((0, N_CURVE))
+    return reference_curves([scores], [known]).curves
+
+
+def _alone(votes: Votes, index: OpenedIndex, search: SearchConfig, k: int) -> list[Scores]:
+    """Each detector's own answer."""
+    detectors = index.config.features.detectors
+    sizes = sizes_of(index, detectors, search)
+    return [
+        joined_votes([votes[name, k]], None if sizes is None else [sizes[name]])
+        for name in detectors
+    ]

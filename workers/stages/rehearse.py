@@ -1,0 +1,80 @@
+"""Rehearse: a query of a known place, answered in every way that an evaluation compares."""
+
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contracts.config import Weight
+from contracts.errors import UnusableImage
+from index.votes import write_outcomes, write_votes
+from retrieval.candidates import FirstLook, candidate_features
+from retrieval.ways import Outcome, ap_together, outcomes
+from workers.messages import RehearseMessage
+from workers.stages.judge import junk_of, read_query
+from workers.stages.retrieve import densities, detector_votes, open_index, sizes_of, words_of
+
+
+def rehearse_photo(request: RehearseMessage) -> dict[str, Any]:
+    """What every pair and k achieves on one query, and what a choice may know of them.
+
+    The answers of all other ways are left in the file that the message names, if it does.
+    `error` : it cannot be read. `excluded` : it is the only image of its place.
+    """
+    index = open_index(request.index, request.generation)
+    try:
+        photo = read_query(index, request)
+    except UnusableImage as error:
+        return {"query": request.query, "error": str(error)}
+    relevant, junk = set(request.relevant), junk_of(index, photo, request)
+    if not relevant - junk:
+        return {"query": request.query, "excluded": True}
+    detectors = index.config.features.detectors
+    own = (request.search.vote, _ordered(request.search.weights))
+    answer: dict[str, Any] = {
+        "query": request.query,
+        "relevant": sorted(relevant),
+        "junk": sorted(junk),
+    }
+    found: list[Outcome] = []
+    words = words_of(index, photo, detectors, max(request.ks), request.search)
+    weightings = [_ordered(each) for each in request.weightings]
+    for vote, base in product(request.votes, dict.fromkeys(map(_without_norm, weightings))):
+        search = request.search.model_copy(update={"vote": vote, "weights": base})
+        votes = detector_votes(index, words, request.ks, search)
+        for weights in weightings:
+            if _without_norm(weights) != base:
+                continue
+            weighted = search.model_copy(update={"weights": weights})
+            sizes = sizes_of(index, detectors, weighted)
+            rule = (vote, weights)
+            if request.keep is not None:
+                found += outcomes(votes, rule, sizes, relevant, junk, wide=rule == own)
+            if rule != own:
+                continue
+            if request.keep is not None:
+                write_votes(Path(request.keep), votes)
+            features = candidate_features(
+                photo.complementarity(detectors),
+                densities(index, detectors, search),
+                request.ks,
+                FirstLook(votes, sizes, junk),
+            )
+            answer["features"] = [[*pair, k, *values] for (pair, k), values in features.items()]
+            together = ap_together(votes, sizes, tuple(features), relevant, junk)
+            answer["together"] = [
+                [None if np.isnan(ap) else float(ap) for ap in row] for row in together
+            ]
+    if request.keep is not None:
+        write_outcomes(Path(request.keep), found)
+    return answer
+
+
+def _ordered(weights: Sequence[Weight]) -> tuple[Weight, ...]:
+    return tuple(sorted(weights))
+
+
+def _without_norm(weights: Sequence[Weight]) -> tuple[Weight, ...]:
+    return tuple(each for each in weights if each != "norm")
