@@ -35,7 +35,7 @@ def command(
 
 def _table(report: "DemoReport") -> Table:
     table = Table(title="Where was it taken? Metres from the truth; * = on the right facade")
-    for name in ("query", "style", "pair", "k"):
+    for name in ("query", "style", "detectors", "k"):
         table.add_column(name, no_wrap=True)
     for name in ("Flaneur", "bag of words", "random"):
         table.add_column(name, justify="right", no_wrap=True)

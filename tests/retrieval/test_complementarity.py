@@ -120,6 +120,34 @@ def test_an_empty_set_complements_nothing() -> None:
     assert complementarity(frames([(1, 1)]), none, 300, 400).csdi == 0.0
 
 
+def test_identical_sets_add_nothing_to_each_other() -> None:
+    points = frames([(0, 0), (60, 0), (0, 80)])
+    got = complementarity(points, points, 300, 400)
+    inverse = 500 / 60 + 500 / 80 + 500 / 100
+    assert got.csdi == pytest.approx(6 / (2 * inverse), rel=1e-5)  # each point counts once
+    assert (got.kp_thousands, got.csco) == (0.006, 0.0)
+    assert got.cscl == pytest.approx(0.0)
+
+
+def test_disjoint_halves_add_everything() -> None:
+    left = frames([(x, y) for x in (0, 50, 100) for y in (0, 100)])
+    right = frames([(x, y) for x in (200, 250, 300) for y in (0, 100)])
+    got = complementarity(left, right, 300, 400)
+    assert (got.csco, got.cscl) == (1.0, 1.0)
+    alone = complementarity(left, left, 300, 400)
+    assert got.csdi > alone.csdi
+
+
+def test_a_clump_is_little_spread_and_one_cluster() -> None:
+    clump = frames([(100, 100), (102, 100), (100, 102), (102, 102)])
+    wide = frames([(0, 0), (300, 0), (0, 400), (300, 400)])
+    assert complementarity(clump, clump, 300, 400).csdi < 0.01
+    together = complementarity(clump, wide, 300, 400)
+    assert (together.csco, together.cscl) == (1.0, 1.0)  # five clusters, each of one detector
+    mixed = frames([(101, 101), (101, 103), (103, 101), (99, 99)])
+    assert complementarity(clump, mixed, 300, 400).cscl == pytest.approx(0.0)
+
+
 def test_the_order_of_a_pair_does_not_matter() -> None:
     a, b = frames(scattered(90, 4)), frames(scattered(70, 5))
     assert complementarity(a, b, 300, 300) == complementarity(b, a, 300, 300)
