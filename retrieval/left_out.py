@@ -187,14 +187,24 @@ def _predictions(
     return predicted
 
 
-def _folds(groups: NDArray[np.str_]) -> list[NDArray[np.bool_]]:
-    named = np.unique(groups)
-    if len(named) < 2:
+def check_groups(groups: NDArray[np.str_]) -> None:
+    """Refuse what cannot be left out in turn.
+
+    Raises
+    ------
+    WrongInput : there are fewer than two groups.
+    """
+    n_groups = len(np.unique(groups))
+    if n_groups < 2:
         raise WrongInput(
             "the adaptive choice is judged with each place left out: queries of at least 2 "
-            f"places are needed, got {len(named)}"
+            f"places are needed, got {n_groups}"
         )
-    return [groups == name for name in named]
+
+
+def _folds(groups: NDArray[np.str_]) -> list[NDArray[np.bool_]]:
+    check_groups(groups)
+    return [groups == name for name in np.unique(groups)]
 
 
 def _boosting_rows(features: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from index.opened import OpenedIndex
 from index.votes import read_outcomes, read_votes
 from retrieval.evaluation import judge_scores
 from retrieval.fusion import Scores
+from retrieval.left_out import check_groups
 from retrieval.resampling import Interval, bootstrap_mean
 from retrieval.score_curves import N_CURVE, Reference, query_adaptive, reference_curves
 from retrieval.trials import Trials, joined
@@ -71,11 +72,12 @@ def results_of(
 
     Raises
     ------
-    WrongInput : no query could be judged.
+    WrongInput : no query could be judged, or all lie at one place.
     """
     judged = ["together" in answer for answer in answers]
     places = {query: prefix + place for query, place in places_of(queries).items()}
     trials = trials_of(answers, places, set_names)
+    check_groups(trials.places)
     files = [votes_file(votes_folder, at) for at in np.flatnonzero(judged).tolist()]
     outcomes = [read_outcomes(file) for file in files]
     return Results(
@@ -129,12 +131,17 @@ def _query_adaptive(
         for number, answer in enumerate(answers):
             others = np.flatnonzero(trials.places != trials.places[number]).tolist()
             references = [
-                Reference(np.concatenate([curves[other][at] for other in others]))
-                for at in range(len(detectors))
+                _reference([curves[other][at] for other in others]) for at in range(len(detectors))
             ]
             fused = query_adaptive(systems[number], references)
             found[k].append(judge_scores(fused, answer["relevant"], answer["junk"]).ap)
     return {k: np.array(values) for k, values in found.items()}
+
+
+def _reference(curves: Sequence[NDArray[np.float64]]) -> Reference:
+    """All curves of one system; where nothing wrong was ever found, a flat one: it says nothing."""
+    flat = np.zeros((1, N_CURVE))
+    return Reference(np.concatenate(curves) if sum(map(len, curves)) else flat)
 
 
 def _wrong_curve(scores: Scores, answer: Json) -> NDArray[np.float64]:

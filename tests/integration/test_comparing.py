@@ -1,0 +1,145 @@
+"""Training and the paper's tables, from photos to files, through real workers."""
+
+import csv
+import json
+from contextlib import nullcontext
+from pathlib import Path
+
+import flaneur_command
+import numpy as np
+import pytest
+from PIL import Image
+
+from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from contracts.errors import WrongInput
+from coordinator.cli.show import Bars
+from coordinator.comparing.report import compare
+from coordinator.engine import Engine
+from coordinator.indexing import run_job
+from coordinator.plan import make_plan, read_surveys
+from coordinator.querying import judge_queries
+from coordinator.truth import JudgedQuery, read_truth
+from index.opened import OpenedIndex
+from retrieval.choice import ChoiceModel
+from survey import ReadOptions
+
+CONFIG = IndexConfig(
+    features=FeatureConfig(detectors=("hesaff", "mser", "star"), max_frames=150),
+    codebooks=CodebookConfig(max_words=200),
+)
+N_QUERIES = 5
+
+
+@pytest.fixture(scope="module")
+def opened(
+    small_survey: Path, tmp_path_factory: pytest.TempPathFactory, engine: Engine
+) -> OpenedIndex:
+    root = tmp_path_factory.mktemp("compared")
+    intake = read_surveys([("", small_survey)], ReadOptions(crs="EPSG:2154"))
+    job, plan = make_plan(root, intake, CONFIG, 4)
+    run_job(job, plan, intake, nullcontext(engine), Bars(None))
+    return OpenedIndex(root)
+
+
+@pytest.fixture(scope="module")
+def truth(small_survey: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Noisy parts of five images; the image and the one after it are relevant."""
+    folder = tmp_path_factory.mktemp("queries")
+    rng = np.random.default_rng(0)
+    relevant = {}
+    for number in range(N_QUERIES):
+        photo = np.asarray(Image.open(small_survey / f"{2 * number:02d}.jpg"), dtype=np.float64)
+        part = photo[20:200, 30:260] + rng.normal(0, 25, (180, 230, 3))
+        Image.fromarray(part.clip(0, 255).astype(np.uint8)).save(folder / f"q{number}.png")
+        relevant[f"q{number}.png"] = [f"{2 * number:02d}.jpg", f"{2 * number + 1:02d}.jpg"]
+    (folder / "ground_truth.json").write_text(json.dumps(relevant))
+    return folder / "ground_truth.json"
+
+
+@pytest.fixture(scope="module")
+def queries(truth: Path, opened: OpenedIndex) -> list[JudgedQuery]:
+    return read_truth(truth, None, opened.catalogue.column("uri"))
+
+
+@pytest.fixture(scope="module")
+def report(
+    opened: OpenedIndex,
+    queries: list[JudgedQuery],
+    engine: Engine,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
+    out = tmp_path_factory.mktemp("report")
+    compare(opened, queries, SearchConfig(), "parts", out, engine.follower, Bars(None))
+    return out
+
+
+def rows(report: Path, name: str) -> list[dict[str, str]]:
+    with (report / f"{name}.csv").open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_tables_and_figures_are_written_and_votes_are_not_left_behind(
+    report: Path, opened: OpenedIndex
+) -> None:
+    text = (report / "tables.md").read_text(encoding="utf-8")
+    for title in ("Table I", "Table II", "Table III", "Table IV", "controls", "Rules of fusion"):
+        assert title in text
+    for name in ("table-1", "controls", "sets", "differences", "figure-2"):
+        assert (report / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert not list((opened.root / "rehearsals").iterdir())
+
+
+@pytest.mark.parametrize("pair", [("hesaff", "mser"), ("mser", "star")])
+def test_a_pair_measures_what_evaluating_it_alone_measures(
+    report: Path,
+    opened: OpenedIndex,
+    queries: list[JudgedQuery],
+    engine: Engine,
+    pair: tuple[str, str],
+) -> None:
+    search = SearchConfig.of(pair=pair, k=2)
+    answers = judge_queries(opened, queries, search, engine.follower, lambda: None)
+    (row,) = [row for row in rows(report, "table-1") if row["pair"] == "-".join(pair)]
+    mean = np.mean([answer["ap"] for answer in answers])
+    assert float(row["measured mAP"]) == pytest.approx(mean)
+
+
+def test_controls_bound_every_choice(report: Path) -> None:
+    means = {row["choice"]: float(row["mAP"]) for row in rows(report, "controls")}
+    assert means["oracle pair and k"] >= means["random pair and k"]
+    assert means["fixed"] == means["best fixed pair and k"]
+    for name in ("eq1", "kp_only", "gain", "look", "boosted"):
+        assert means[name] <= means["oracle pair and k"] + 1e-12
+    (fixed,) = [row for row in rows(report, "controls") if row["choice"] == "fixed"]
+    assert float(fixed["gain over best fixed"]) == 0
+
+
+def test_queries_of_one_place_cannot_be_compared(
+    opened: OpenedIndex, queries: list[JudgedQuery], engine: Engine, tmp_path: Path
+) -> None:
+    with pytest.raises(WrongInput, match="at least 2 places"):
+        compare(opened, queries[:1], SearchConfig(), "one", tmp_path, engine.follower, Bars(None))
+    assert not list((opened.root / "rehearsals").iterdir())
+
+
+def test_training_writes_a_model_that_says_what_it_is_made_of(
+    opened: OpenedIndex, truth: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "choice.json"
+    command = ("train", "--index", opened.root, "--truth", truth, "--variant", "gain")
+    done = flaneur_command.run(*command, "--out", out, "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    model = ChoiceModel.from_json(out.read_text(encoding="utf-8"))
+    assert model.variant == "gain"
+    assert model.index_digest == opened.generation.digest()
+    assert [(one.n_queries, one.n_places) for one in model.trained_on] == [(N_QUERIES, N_QUERIES)]
+    assert {each.k for each in model.fixed} == {2, 5, 10}
+    assert model.detectors == ("hesaff", "mser", "star")
+    assert all(each.low <= each.value <= each.high for each in model.coefficients)
+
+
+def test_an_unknown_variant_is_refused_by_name(opened: OpenedIndex, truth: Path) -> None:
+    command = ("train", "--index", opened.root, "--truth", truth, "--variant", "magic")
+    done = flaneur_command.run(*command)
+    assert done.returncode == 2
+    assert "--variant takes auto or one of fixed, eq1," in done.stderr
