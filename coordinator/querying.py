@@ -37,10 +37,12 @@ class Rules:
         return cls((search.vote,), (search.weights,))
 
     @classmethod
-    def all_for(cls, n_descriptors: int) -> "Rules":
-        """Every vote that so many descriptors can give, with the weightings worth comparing."""
+    def all_for(cls, n_descriptors: int, search: SearchConfig) -> "Rules":
+        """Every vote that so many descriptors can give, by the usual weightings and one's own."""
         votes = tuple(vote for vote in get_args(Vote) if vote != "pairwise" or n_descriptors > 1)
-        return cls(votes, WEIGHTINGS)
+        own = tuple(sorted(search.weights))
+        known = {tuple(sorted(each)) for each in WEIGHTINGS}
+        return cls(votes, WEIGHTINGS if own in known else (*WEIGHTINGS, own))
 
 
 @dataclass(frozen=True, slots=True)

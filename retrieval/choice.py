@@ -10,7 +10,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from contracts.config import MAX_NEIGHBOURS, Descriptor, Detector, VariantName, Vote, Weight
 from contracts.errors import BadIndex, WrongInput
 from retrieval.candidates import FEATURES, Candidate, Pair
-from retrieval.regression import VARIANTS, Column, Regression, columns, used_features
+from retrieval.regression import (
+    VARIANTS,
+    Column,
+    Regression,
+    columns,
+    is_outside,
+    used_features,
+)
 
 N_JOINED: tuple[Literal[1, 2], ...] = (1, 2)
 """How many rankings, of pairs of one k, are joined."""
@@ -48,7 +55,7 @@ class TrainingSet(Record):
 class Range(Record):
     """A mean and its bootstrap 95 % interval; None where it cannot be told."""
 
-    mean: float
+    mean: float | None
     low: float | None
     high: float | None
 
@@ -243,7 +250,7 @@ class ChoiceModel(Record):
         n_queries = sum(one.n_queries for one in self.trained_on)
         return (
             f"{n_queries} queries, each with its place left out: {self._name()} mAP "
-            f"{scores.adaptive.mean:.3f}, best fixed pair {scores.best_fixed:.3f} (difference "
+            f"{_number(scores.adaptive.mean)}, best fixed pair {scores.best_fixed:.3f} (difference "
             f"{_interval(scores.gain)}), random {scores.random:.3f}, oracle {scores.oracle:.3f}; "
             f"{scores.n_chosen} different choices; best for all: {'-'.join(best.pair)} with "
             f"k = {best.k}"
@@ -259,13 +266,16 @@ class ChoiceModel(Record):
 
     def _outside(self, table: np.ndarray) -> str:
         """Name the terms outside their range in training; empty if none is."""
-        seen = used_features(VARIANTS[self.variant], table)[0]
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        variant = VARIANTS[self.variant]
+        low = np.array([each.low for each in self.ranges])
+        high = np.array([each.high for each in self.ranges])
+        beyond = is_outside(variant, table, low, high)[0]
+        seen = used_features(variant, table)[0]
         return " and ".join(
-            f"{each.term} was {each.low:.3g} to {each.high:.3g} in training, here {least:.3g} to "
-            f"{most:.3g}"
-            for each, least, most in zip(self.ranges, low, high, strict=True)
-            if least < each.low or most > each.high
+            f"{each.term} was {each.low:.3g} to {each.high:.3g} in training, here "
+            f"{values.min():.3g} to {values.max():.3g}"
+            for each, values, is_beyond in zip(self.ranges, seen.T, beyond, strict=True)
+            if is_beyond
         )
 
     def _nothing_allowed(self, allowed: Collection[Candidate] | None) -> WrongInput:
@@ -278,6 +288,12 @@ class ChoiceModel(Record):
 
 
 def _interval(value: Range) -> str:
+    if value.mean is None:
+        return "unknown"
     if value.low is None or value.high is None:
         return f"{value.mean:+.3f}"
     return f"{value.mean:+.3f} [{value.low:+.3f}, {value.high:+.3f}]"
+
+
+def _number(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.3f}"

@@ -28,8 +28,8 @@ from retrieval.regression import (
     VARIANTS,
     Variant,
     columns,
+    feature_ranges,
     fit_regression,
-    used_features,
 )
 from retrieval.resampling import Interval
 from retrieval.trials import Trials
@@ -72,7 +72,8 @@ def fit_choice(
     name, n_joined = max(
         made, key=lambda key: float(np.average(achieved(trials, made[key]), weights=weights_of))
     )
-    found = worth(trials, picked_by_others(trials, list(made.values()), trials.places), beside)
+    picked = picked_by_others(trials, list(made.values()), trials.places)
+    found = worth(trials, picked, beside, trials.places)
     means = trials.mean_ap()
     order = np.argsort(-means, kind="stable")
     return ChoiceModel(
@@ -114,8 +115,7 @@ def _range(interval: Interval) -> Range:
     def known(value: float) -> float | None:
         return value if np.isfinite(value) else None
 
-    mean = interval.mean if np.isfinite(interval.mean) else 0.0
-    return Range(mean=mean, low=known(interval.low), high=known(interval.high))
+    return Range(mean=known(interval.mean), low=known(interval.low), high=known(interval.high))
 
 
 def _coefficients(trials: Trials, variant: Variant) -> tuple[Coefficient, ...]:
@@ -149,8 +149,7 @@ def _draws(trials: Trials) -> Sequence[NDArray[np.float64]]:
 
 
 def _ranges(trials: Trials, variant: Variant) -> tuple[TermRange, ...]:
-    seen = used_features(variant, trials.features)
-    low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
+    low, high = feature_ranges(trials, variant)
     return tuple(
         TermRange(term=term, low=float(least), high=float(most))
         for term, least, most in zip(variant.terms, low, high, strict=True)

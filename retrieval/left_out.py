@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import WrongInput
-from retrieval.regression import Variant, fit_regression
-from retrieval.resampling import Interval, bootstrap_difference, bootstrap_mean, bootstrap_ratio
+from retrieval.regression import Variant, feature_ranges, fit_regression, is_outside
+from retrieval.resampling import Interval, bootstrap_ratio, weighted_mean
 from retrieval.trials import Trials
 
 _BOOSTING_FOLDS = 10
@@ -56,6 +56,9 @@ def left_out_predictions(
 ) -> NDArray[np.float64]:
     """Predict every query's mAP' by a fit without its group; (n, c) float64.
 
+    Where a query's features lie outside those of the fit, what each candidate achieved in
+    training is predicted, as `ChoiceModel.choose` falls back to what was best for all.
+
     groups : (n,) labels, as a rule `trials.places`; `trials.sets` asks more.
 
     Raises
@@ -64,7 +67,15 @@ def left_out_predictions(
     """
 
     def fitted(training: Trials) -> Predict:
-        return fit_regression(training, variant).predict
+        regression = fit_regression(training, variant)
+        low, high = feature_ranges(training, variant)
+
+        def predict(features: NDArray[np.float64]) -> NDArray[np.float64]:
+            outside = np.asarray(is_outside(variant, features, low, high).any(axis=1))
+            predicted = regression.predict(features)
+            return np.where(outside[:, np.newaxis], training.mean_ap(), predicted)
+
+        return predict
 
     return _predictions(trials, groups, fitted)
 
@@ -162,17 +173,22 @@ def picked_by_others(
     return picked
 
 
-def worth(trials: Trials, choices: NDArray[np.int64], beside: Controls) -> Worth:
-    """Hold choices against the best fixed candidate."""
+def worth(
+    trials: Trials, choices: NDArray[np.int64], beside: Controls, groups: NDArray[np.str_]
+) -> Worth:
+    """Hold choices against the best fixed candidate, queries weighed as in training.
+
+    groups : what was left out together, and is drawn together for the intervals; (n,) labels.
+    """
     weights = trials.weights()
     got = achieved(trials, choices)
     return Worth(
-        bootstrap_mean(got * weights, trials.places),
-        bootstrap_difference(got * weights, beside.best_fixed * weights, trials.places),
+        weighted_mean(got, weights, groups),
+        weighted_mean(got - beside.best_fixed, weights, groups),
         bootstrap_ratio(
             (got - beside.best_fixed) * weights,
             (beside.oracle - beside.best_fixed) * weights,
-            trials.places,
+            groups,
         ),
         len(np.unique(choices, axis=0)),
     )

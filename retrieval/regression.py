@@ -25,6 +25,8 @@ from retrieval.trials import Trials
 _RIDGE = 0.03
 """Of the variants with many constants, on standardised columns."""
 
+_ROUNDING = 1e-9
+
 _Rows = NDArray[np.float64]
 
 
@@ -152,6 +154,29 @@ def fit_regression(
         variant.ridge,
     )
     return Regression(variant, trials.candidates, coefficients, level)
+
+
+def feature_ranges(
+    trials: Trials, variant: Variant
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest value of each term in training; (t,) float64 each."""
+    seen = used_features(variant, trials.features)
+    return seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
+
+
+def is_outside(
+    variant: Variant,
+    features: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Which terms of which queries leave their range in training; (n, t) bool.
+
+    A rounding error does not: a term that is the same for all candidates differs by one.
+    """
+    seen = used_features(variant, features)
+    beyond = (seen < low - _ROUNDING) | (seen > high + _ROUNDING)
+    return np.asarray(beyond.any(axis=1), dtype=np.bool_)
 
 
 def used_features(variant: Variant, features: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -66,6 +66,30 @@ def bootstrap_mean(
     return Interval(mean, _low(means), _high(means))
 
 
+def weighted_mean(
+    values: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    groups: Groups | None = None,
+    n_resamples: int = 10_000,
+    seed: int = 0,
+) -> Interval:
+    """Weighted mean and its interval; every resample is divided by the weights it drew.
+
+    Parameters
+    ----------
+    values, weights : (n,) finite, the weights positive. groups : as for `bootstrap_mean`.
+
+    Raises
+    ------
+    WrongInput : as `bootstrap_mean`.
+    """
+    _check_pair(values, weights)
+    # Constant values must give an interval of no width, as in `bootstrap_mean`.
+    origin = float(values[0]) if len(values) else 0.0
+    shifted = bootstrap_ratio((values - origin) * weights, weights, groups, n_resamples, seed)
+    return Interval(origin + shifted.mean, origin + shifted.low, origin + shifted.high)
+
+
 def bootstrap_difference(
     a: NDArray[np.float64],
     b: NDArray[np.float64],

@@ -125,7 +125,7 @@ def _rehearsed(
                 index,
                 queries,
                 SearchConfig(),
-                Rules.all_for(len(DESCRIPTORS)),
+                Rules.all_for(len(DESCRIPTORS), SearchConfig()),
                 KS,
                 engine.follower,
                 lambda: progress.advance(f"rehearse {folder.name}"),

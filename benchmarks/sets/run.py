@@ -29,7 +29,7 @@ def run(data: Path) -> None:
     with running_engine(None, None) as engine:
         parts = [_results(each, search) for each in rehearsed_sets(data, OUT, engine)]
     results = joined_results(parts)
-    choices = write_comparison(OUT / "report", results)
+    write_comparison(OUT / "report", results)
     print((OUT / "report" / "tables.md").read_text(encoding="utf-8"))
     _other_collections(results)
     model = fit_choice(
@@ -42,7 +42,6 @@ def run(data: Path) -> None:
     )
     SHIPPED.write_text(model.to_json() + "\n", encoding="utf-8")
     print(f"\nShipped: {model.summary()}")
-    print(f"Best on places left out: {choices.winner(results.trials)}")
 
 
 def _results(each: Rehearsed, search: SearchConfig) -> Results:

@@ -51,7 +51,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> int:
     """Search for every query of a ground truth and score the rankings."""
-    from coordinator.comparing.report import compare
+    from coordinator.comparing.report import check_comparable, compare
     from coordinator.engine import running_engine
     from coordinator.evaluating import report_of, table_of, write_sheets
     from coordinator.export.files import write_whole
@@ -67,23 +67,24 @@ def command(
         raise BadConfig("--tables writes several files; name a folder with --out")
     catalogue = opened.catalogue
     queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
+    if tables:
+        check_comparable(opened, queries)
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
         progress.begin("evaluate", len(queries), 0)
         answers = judge_queries(
             opened, queries, search, engine.follower, lambda: progress.advance("evaluate")
         )
+        for answer in answers:
+            if "error" in answer:
+                complain(f"{answer['query']}: {answer['error']}")
+        report = report_of(answers, opened, search)
+        text = json.dumps(report, ensure_ascii=False, allow_nan=False)
+        if out is not None:
+            write_whole(out / "report.json", utf_8(text))
+            write_whole(out / "report.md", utf_8(table_of(report)))
+            write_sheets(out / "index.html", report, answers, queries, opened, progress)
         if tables and out is not None:
             name = truth.absolute().parent.name
             compare(opened, queries, search, name, out, engine.follower, progress)
-    for answer in answers:
-        if "error" in answer:
-            complain(f"{answer['query']}: {answer['error']}")
-    report = report_of(answers, opened, search)
-    text = json.dumps(report, ensure_ascii=False, allow_nan=False)
-    if out is not None:
-        write_whole(out / "report.json", utf_8(text))
-        write_whole(out / "report.md", utf_8(table_of(report)))
-        with bars() as progress:
-            write_sheets(out / "index.html", report, answers, queries, opened, progress)
     typer.echo(utf_8(text if as_json else table_of(report)))
     return SOME_SKIPPED if report["unreadable"] else 0

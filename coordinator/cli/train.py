@@ -48,6 +48,7 @@ def command(
     broker: Broker = None,
 ) -> int:
     """Fit the model that chooses detectors and k for each photo (Eq. 1 of the paper)."""
+    from coordinator.comparing.report import check_comparable
     from coordinator.engine import running_engine
     from coordinator.export.files import write_whole
     from coordinator.querying import Rules, rehearse_queries
@@ -63,6 +64,7 @@ def command(
     out = None if out is None else result_file(out, (truth,))
     catalogue = opened.catalogue
     queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
+    check_comparable(opened, queries)
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
         progress.begin("train", len(queries), 0)
         answers = rehearse_queries(

@@ -25,8 +25,8 @@ Key = tuple[str, int]
 ADAPTIVE: Key = ("eq1", 1)
 """The paper's own choice."""
 
-PICKED: Key = ("whichever of these is best on other places", 1)
-"""What all of them together are worth, the pick included."""
+PICKED: Key = ("whichever variant is best on other places", 1)
+"""What a model is worth, the pick of its variant included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +44,6 @@ class Choices:
     def ap(self, trials: Trials, key: Key) -> NDArray[np.float64]:
         """AP of every query by one choice; (n,)."""
         return achieved(trials, self.made[key])
-
-    def winner(self, trials: Trials) -> Key:
-        """The choice of the highest mean AP that a model can hold; the first if equal."""
-        weights = trials.weights()
-        usable = [key for key in self.made if key[0] in VARIANTS]
-        return max(usable, key=lambda key: float(np.average(self.ap(trials, key), weights=weights)))
 
 
 def choices_of(trials: Trials, groups: NDArray[np.str_]) -> Choices:
@@ -70,5 +64,6 @@ def choices_of(trials: Trials, groups: NDArray[np.str_]) -> Choices:
         for name, predicted in predictions.items()
         for n_joined in N_JOINED
     }
-    made[PICKED] = picked_by_others(trials, list(made.values()), groups)
+    usable = [each for (name, _), each in made.items() if name in VARIANTS]
+    made[PICKED] = picked_by_others(trials, usable, groups)
     return Choices(made, controls(trials, groups), predictions["eq1"], groups)

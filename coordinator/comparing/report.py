@@ -1,15 +1,16 @@
 """The report of a comparison: tables as Markdown and CSV, figures as PNG."""
 
-import os
 import shutil
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from contracts.config import SearchConfig
+from contracts.errors import WrongInput
 from coordinator.comparing import paper
-from coordinator.comparing.choices import Choices, choices_of
+from coordinator.comparing.choices import choices_of
 from coordinator.comparing.results import Results, results_of
 from coordinator.comparing.summary import chosen_shares, rules_table, summary_tables
 from coordinator.comparing.tables import paper_tables
@@ -19,8 +20,10 @@ from coordinator.export.tables import write_tables
 from coordinator.follow import Follower
 from coordinator.indexing import Progress
 from coordinator.querying import Rules, rehearse_queries
+from coordinator.training import places_of
 from coordinator.truth import JudgedQuery
 from index.opened import OpenedIndex
+from retrieval.left_out import check_groups
 from workers.stages.choose import KS
 
 TITLE = "Fusion and the choice of detectors, measured"
@@ -42,9 +45,9 @@ def compare(
     WrongInput : no query can be judged, all are of one place, or nothing can be written there.
     """
     n_descriptors = len(search.descriptors or index.config.features.descriptors)
-    rules = Rules.all_for(n_descriptors)
+    rules = Rules.all_for(n_descriptors, search)
     # Workers elsewhere share the index with us, and not the report's folder.
-    votes = index.root / "rehearsals" / f"{os.getpid()}"
+    votes = _shared_folder(index.root / "rehearsals")
     progress.begin("tables", len(queries), 0)
     try:
         answers = rehearse_queries(
@@ -56,12 +59,37 @@ def compare(
         shutil.rmtree(votes, ignore_errors=True)
 
 
-def write_comparison(out: Path, results: Results) -> Choices:
-    """Write `tables.md`, a CSV a table, and the figures into a folder.
+def check_comparable(index: OpenedIndex, queries: Sequence[JudgedQuery]) -> None:
+    """Refuse before the work what cannot be compared after it.
 
-    Returns
-    -------
-    The choices, made without each query's place.
+    Raises
+    ------
+    WrongInput : the index has one detector, or all queries lie at one place.
+    """
+    if len(index.config.features.detectors) < 2:
+        raise WrongInput(
+            f"pairs of detectors are compared and {index.root} has only one detector; index again "
+            "with two or more --detectors"
+        )
+    check_groups(np.array(sorted(set(places_of(queries).values()))))
+
+
+def _shared_folder(parent: Path) -> Path:
+    """A new folder that workers of other users may write to."""
+    try:
+        parent.mkdir(exist_ok=True)
+        folder = Path(tempfile.mkdtemp(dir=parent))
+        folder.chmod(0o777)
+    except OSError as error:
+        raise WrongInput(
+            f"{parent} cannot be written ({error.strerror}), and the votes of queries are kept "
+            "there for a while; make the index folder writable"
+        ) from error
+    return folder
+
+
+def write_comparison(out: Path, results: Results) -> None:
+    """Write `tables.md`, a CSV a table, and the figures into a folder.
 
     Raises
     ------
@@ -96,4 +124,3 @@ def write_comparison(out: Path, results: Results) -> Choices:
     write_whole(out / "differences.png", differences)
     panels = chosen_shares(results, made, paper.SHARE_OF_K_2[0])
     write_whole(out / "figure-2.png", draw_shares("Chosen by Eq. 1, place left out", panels))
-    return made

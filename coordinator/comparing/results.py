@@ -18,10 +18,10 @@ from index.votes import read_outcomes, read_votes
 from retrieval.evaluation import judge_scores
 from retrieval.fusion import Scores
 from retrieval.left_out import check_groups
-from retrieval.resampling import Interval, bootstrap_mean
+from retrieval.resampling import Interval, weighted_mean
 from retrieval.score_curves import N_CURVE, Reference, query_adaptive, reference_curves
 from retrieval.trials import Trials, joined
-from retrieval.ways import Votes, Way, joined_votes
+from retrieval.ways import Way, joined_votes
 from workers.stages.retrieve import sizes_of
 
 Json = dict[str, Any]
@@ -50,7 +50,7 @@ class Results:
     def mean(self, values: NDArray[np.float64], rows: NDArray[np.bool_]) -> Interval:
         """Mean of some queries, weighed as in training, and its interval over places."""
         chosen = self.trials.take(rows)
-        return bootstrap_mean(values[rows] * chosen.weights(), chosen.places)
+        return weighted_mean(values[rows], chosen.weights(), chosen.places)
 
 
 def results_of(
@@ -123,17 +123,17 @@ def _query_adaptive(
     ks = tuple(sorted({k for _, k in trials.candidates}))
     found: dict[int, list[float]] = {k: [] for k in ks}
     for k in ks:
-        systems = [_alone(read_votes(file, detectors, (k,)), index, search, k) for file in files]
+        # Votes are read twice: those of all queries at once may be more than the memory.
         curves = [
-            [_wrong_curve(scores, answer) for scores in alone]
-            for alone, answer in zip(systems, answers, strict=True)
+            [_wrong_curve(scores, answer) for scores in _alone(file, index, search, k)]
+            for file, answer in zip(files, answers, strict=True)
         ]
-        for number, answer in enumerate(answers):
+        for number, (file, answer) in enumerate(zip(files, answers, strict=True)):
             others = np.flatnonzero(trials.places != trials.places[number]).tolist()
             references = [
                 _reference([curves[other][at] for other in others]) for at in range(len(detectors))
             ]
-            fused = query_adaptive(systems[number], references)
+            fused = query_adaptive(_alone(file, index, search, k), references)
             found[k].append(judge_scores(fused, answer["relevant"], answer["junk"]).ap)
     return {k: np.array(values) for k, values in found.items()}
 
@@ -152,9 +152,10 @@ def _wrong_curve(scores: Scores, answer: Json) -> NDArray[np.float64]:
     return reference_curves([scores], [known]).curves
 
 
-def _alone(votes: Votes, index: OpenedIndex, search: SearchConfig, k: int) -> list[Scores]:
-    """Each detector's own answer."""
+def _alone(file: Path, index: OpenedIndex, search: SearchConfig, k: int) -> list[Scores]:
+    """Each detector's own answer to a query, from its votes."""
     detectors = index.config.features.detectors
+    votes = read_votes(file, detectors, (k,))
     sizes = sizes_of(index, detectors, search)
     return [
         joined_votes([votes[name, k]], None if sizes is None else [sizes[name]])

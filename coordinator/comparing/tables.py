@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from contracts.config import Detector
 from coordinator.comparing import paper
-from coordinator.comparing.choices import ADAPTIVE, Choices
+from coordinator.comparing.choices import ADAPTIVE, PICKED, Choices
 from coordinator.comparing.results import Results
 from coordinator.export.tables import Cell, Table
 from retrieval.late_fusion import LATE_FUSIONS, LateFusion
@@ -38,7 +38,8 @@ def _by_prediction(
     results: Results, choices: Choices, rows: Rows
 ) -> list[tuple[tuple[Detector, Detector], float]]:
     """Pairs by their mean mAP' at k = 2, best first."""
-    means = choices.predicted[rows].mean(axis=0)
+    weights = results.trials.take(rows).weights()
+    means = np.average(choices.predicted[rows], axis=0, weights=weights)
     found = [
         (pair, float(means[at]))
         for at, (pair, k) in enumerate(results.trials.candidates)
@@ -133,9 +134,8 @@ def _by_k(
             lines.append(("-".join(pair), str(k), mean, *printed))
     adaptive = results.mean(choices.ap(results.trials, ADAPTIVE), rows)
     lines.append(("adaptive (Eq. 1)", "adaptive", adaptive, *paper.ADAPTIVE))
-    winner = choices.winner(results.trials)
-    won = results.mean(choices.ap(results.trials, winner), rows)
-    lines.append((f"chosen: {choice_name(winner)}", "adaptive", won, *_NONE))
+    picked = results.mean(choices.ap(results.trials, PICKED), rows)
+    lines.append((PICKED[0], "adaptive", picked, *_NONE))
     return Table(
         "table-4",
         "Table IV: detector pairs and k",
@@ -163,7 +163,7 @@ def controls_table(results: Results, choices: Choices, rows: Rows) -> Table:
         )
     ]
     for key, made in choices.made.items():
-        found = worth(trials, made[rows], beside)
+        found = worth(trials, made[rows], beside, choices.groups[rows])
         lines.append((choice_name(key), found.ap, found.gain, found.share, found.n_chosen))
     return Table(
         "controls",
@@ -197,7 +197,10 @@ def ap_of(
 
 def best_late(results: Results, detectors: tuple[Detector, ...], k: int, rows: Rows) -> LateFusion:
     """The late fusion of the highest mAP, by hindsight."""
-    return max(LATE_FUSIONS, key=lambda name: ap_of(results, name, detectors, k)[rows].mean())
+    return max(
+        LATE_FUSIONS,
+        key=lambda name: results.mean(ap_of(results, name, detectors, k), rows).mean,
+    )
 
 
 def best_way(results: Results, ways: Sequence[Way], rows: Rows) -> Way:

@@ -13,11 +13,11 @@ from PIL import Image
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from contracts.errors import WrongInput
 from coordinator.cli.show import Bars
-from coordinator.comparing.report import compare
+from coordinator.comparing.report import check_comparable, compare
 from coordinator.engine import Engine
 from coordinator.indexing import run_job
 from coordinator.plan import make_plan, read_surveys
-from coordinator.querying import judge_queries
+from coordinator.querying import WEIGHTINGS, Rules, judge_queries
 from coordinator.truth import JudgedQuery, read_truth
 from index.opened import OpenedIndex
 from retrieval.choice import ChoiceModel
@@ -143,3 +143,24 @@ def test_an_unknown_variant_is_refused_by_name(opened: OpenedIndex, truth: Path)
     done = flaneur_command.run(*command)
     assert done.returncode == 2
     assert "--variant takes auto or one of fixed, eq1," in done.stderr
+
+
+def test_the_searchs_own_weights_are_among_the_rules_that_are_compared() -> None:
+    assert Rules.all_for(3, SearchConfig(weights=("burst",))).weightings[-1] == ("burst",)
+    assert Rules.all_for(3, SearchConfig()).weightings == WEIGHTINGS
+    assert "pairwise" not in Rules.all_for(1, SearchConfig()).votes
+
+
+def test_what_cannot_be_compared_is_refused_before_the_work(
+    opened: OpenedIndex, queries: list[JudgedQuery], truth: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(WrongInput, match="at least 2 places"):
+        check_comparable(opened, queries[:1])
+    check_comparable(opened, queries)
+    one = tmp_path / "one.json"
+    one.write_text('{"q0.png": ["00.jpg"]}')
+    command = ("evaluate", "--index", opened.root, "--truth", one, "--root", truth.parent)
+    done = flaneur_command.run(*command, "--tables", "--out", tmp_path / "report")
+    assert done.returncode == 2
+    assert "at least 2 places" in done.stderr
+    assert not (tmp_path / "report").exists()

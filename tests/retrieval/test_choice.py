@@ -186,7 +186,7 @@ def changed(model: ChoiceModel, *path: str | int, value: object) -> str:
         (("ranges", 0, "low"), "low"),
         (("fixed", 0, "pair"), ["hesaff"]),
         (("fixed",), []),
-        (("left_out", "gain", "mean"), None),
+        (("left_out", "best_fixed"), None),
         (("trained_on",), []),
         (("trained_on", 1, "n_queries"), 0),
     ],

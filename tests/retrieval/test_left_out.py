@@ -17,7 +17,13 @@ from retrieval.left_out import (
     picked_by_others,
     worth,
 )
-from retrieval.regression import VARIANTS, fit_regression
+from retrieval.regression import (
+    VARIANTS,
+    feature_ranges,
+    fit_regression,
+    is_outside,
+    used_features,
+)
 from retrieval.trials import Trials
 
 EACH = pytest.mark.parametrize("name", VARIANTS)
@@ -52,8 +58,31 @@ def test_a_place_left_out_is_predicted_by_a_fit_on_the_others(name: VariantName)
     predicted = left_out_predictions(made, VARIANTS[name], made.places)
     for place in np.unique(made.places):
         here = made.places == place
-        others = fit_regression(made.take(~here), VARIANTS[name])
-        np.testing.assert_array_equal(predicted[here], others.predict(made.features[here]))
+        training = made.take(~here)
+        others = fit_regression(training, VARIANTS[name])
+        low, high = feature_ranges(training, VARIANTS[name])
+        known = ~is_outside(VARIANTS[name], made.features[here], low, high).any(axis=1)
+        expected = others.predict(made.features[here])
+        np.testing.assert_array_equal(predicted[here][known], expected[known])
+
+
+def test_a_photo_unlike_those_of_the_fit_gets_what_was_best_for_all() -> None:
+    made = eq1_trials(30)
+    features = made.features.copy()
+    features[7] *= 5.0
+    made = replace(made, features=features)
+    predicted = left_out_predictions(made, VARIANTS["eq1"], made.places)
+    others = made.take(made.places != made.places[7])
+    np.testing.assert_array_equal(predicted[7], others.mean_ap())
+
+
+def test_a_rounding_error_is_not_outside_the_range() -> None:
+    features = some_features(2)
+    low = high = used_features(VARIANTS["kp_only"], features)[0].max(axis=0)
+    features[:] = features[0].max(axis=0)
+    features[..., 0] = low[0] * (1 + 1e-12)
+    assert not is_outside(VARIANTS["kp_only"], features, low, high).any()
+    assert is_outside(VARIANTS["kp_only"], features + 1e-6, low, high).all()
 
 
 def test_boosting_too_leaves_the_place_out_and_is_the_same_every_time() -> None:
@@ -149,7 +178,7 @@ def test_what_was_achieved_is_the_joined_ranking_s_own_score() -> None:
 def test_who_knows_everything_takes_all_of_the_room() -> None:
     made = two_a_place()
     beside = controls(made, made.places)
-    best = worth(made, chosen(made, made.ap, 1), beside)
+    best = worth(made, chosen(made, made.ap, 1), beside, made.places)
     assert best.share.mean == pytest.approx(1.0)
     assert (best.share.low, best.share.high) == pytest.approx((1.0, 1.0))
     assert best.ap.mean == pytest.approx(beside.oracle.mean())
@@ -161,7 +190,7 @@ def test_who_takes_the_best_fixed_takes_none_of_the_room() -> None:
     made = two_a_place()
     beside = controls(made, made.places)
     predicted = left_out_predictions(made, VARIANTS["fixed"], made.places)
-    fixed = worth(made, chosen(made, predicted, 1), beside)
+    fixed = worth(made, chosen(made, predicted, 1), beside, made.places)
     assert (fixed.gain.mean, fixed.gain.low, fixed.gain.high) == (0.0, 0.0, 0.0)
     assert fixed.share.mean == 0.0
 
@@ -171,10 +200,11 @@ def test_worth_weighs_sets_and_draws_places() -> None:
     ap[0] = 1.0
     sets = ["small", "large", "large", "large", "large"]
     made = trials(ap, places=["a", "b", "b", "c", "c"], sets=sets)
-    found = worth(made, np.zeros((5, 1), dtype=np.int64), controls(made, made.places))
+    nothing = np.zeros((5, 1), dtype=np.int64)
+    found = worth(made, nothing, controls(made, made.places), made.places)
     assert found.ap.mean == pytest.approx(1 / 3)
     alone = trials(ap, places=["a"] * 5, sets=sets)
-    lone = worth(alone, np.zeros((5, 1), dtype=np.int64), controls(made, made.places))
+    lone = worth(alone, nothing, controls(made, made.places), alone.places)
     assert np.isnan(lone.ap.low)
 
 

@@ -10,6 +10,7 @@ from retrieval.resampling import (
     bootstrap_difference,
     bootstrap_mean,
     bootstrap_ratio,
+    weighted_mean,
 )
 
 
@@ -161,3 +162,16 @@ def test_what_cannot_be_resampled_is_refused() -> None:
         bootstrap_difference(two, np.zeros(3))
     with pytest.raises(WrongInput, match="paired"):
         bootstrap_ratio(two, np.zeros(3))
+
+
+def test_a_weighted_mean_of_equal_values_is_sure_whatever_the_weights() -> None:
+    values = np.full(59, 0.9)
+    weights = np.array([1 / np.sqrt(50)] * 50 + [1 / 3] * 9)
+    found = weighted_mean(values, weights)
+    assert (found.mean, found.low, found.high) == pytest.approx((0.9, 0.9, 0.9))
+
+
+def test_a_weighted_mean_divides_each_resample_by_what_it_drew() -> None:
+    values, weights = np.array([0.0, 1.0]), np.array([1.0, 3.0])
+    found = weighted_mean(values, weights)
+    assert (found.mean, found.low, found.high) == pytest.approx((0.75, 0.0, 1.0))

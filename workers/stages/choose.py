@@ -1,6 +1,8 @@
 """Choose: the detectors and k that a photo is searched with: given, by a model, by default."""
 
-from contracts.config import Detector, SearchConfig
+from collections.abc import Collection, Sequence
+
+from contracts.config import DESCRIPTORS, Descriptor, Detector, SearchConfig
 from index.models import read_model
 from index.opened import OpenedIndex
 from retrieval.candidates import Candidate, FirstLook, candidate_features
@@ -23,8 +25,13 @@ KS = (2, 5, 10)
 """What `--k auto` chooses from, as in the paper's Table IV."""
 
 
-def choose(index: Configured, photo: Photo, search: SearchConfig) -> Chosen:
-    """Settle the detectors and k: as given, by the model, or the default that says so."""
+def choose(
+    index: Configured, photo: Photo, search: SearchConfig, junk: Collection[int] = ()
+) -> Chosen:
+    """Settle the detectors and k: as given, by the model, or the default that says so.
+
+    junk : images that the choice may not see, such as the photo itself where it is indexed.
+    """
     if search.pair != "auto" and search.k != "auto":
         return Chosen((search.pair,), search.k, None, "given")
     if search.pair != "auto" and len(search.pair) != 2:
@@ -36,12 +43,18 @@ def choose(index: Configured, photo: Photo, search: SearchConfig) -> Chosen:
         pair = search.pair if search.pair != "auto" else default_pair(index)
         k = search.k if search.k != "auto" else DEFAULT_K
         return Chosen((pair,), k, None, f"default: {why_not}")
-    made = _by_model(model, index, photo, search)
+    made = _by_model(model, index, photo, search, junk)
     k = made.k if search.k == "auto" else search.k
     return Chosen(made.pairs, k, made.predicted_map, made.reason)
 
 
-def _by_model(model: ChoiceModel, index: Configured, photo: Photo, search: SearchConfig) -> Choice:
+def _by_model(
+    model: ChoiceModel,
+    index: Configured,
+    photo: Photo,
+    search: SearchConfig,
+    junk: Collection[int],
+) -> Choice:
     has = set(index.config.features.detectors)
     ks = {k for _, k in model.candidates()}
     asked = search.k
@@ -62,11 +75,15 @@ def _by_model(model: ChoiceModel, index: Configured, photo: Photo, search: Searc
         return model.best_fixed(allowed, f"{best}: the model also wants {missing}")
     if not isinstance(index, OpenedIndex):
         return model.best_fixed(allowed, f"{best}: the model also asks the index")
-    return model.choose(features_of(index, photo, search, model), allowed)
+    return model.choose(features_of(index, photo, search, model, junk), allowed)
 
 
 def features_of(
-    index: OpenedIndex, photo: Photo, search: SearchConfig, model: ChoiceModel
+    index: OpenedIndex,
+    photo: Photo,
+    search: SearchConfig,
+    model: ChoiceModel,
+    junk: Collection[int] = (),
 ) -> dict[Candidate, tuple[float, ...]]:
     """What the model wants to know of every pair and k."""
     ks = sorted({k for _, k in model.candidates()})
@@ -74,7 +91,7 @@ def features_of(
     if model.needs_look:
         words = words_of(index, photo, model.detectors, max(ks), search)
         votes = detector_votes(index, words, ks, search)
-        look = FirstLook(votes, sizes_of(index, model.detectors, search))
+        look = FirstLook(votes, sizes_of(index, model.detectors, search), junk)
     return candidate_features(
         photo.complementarity(model.detectors),
         densities(index, model.detectors, search),
@@ -99,10 +116,12 @@ def fitting_model(index: Configured, search: SearchConfig) -> tuple[ChoiceModel 
     untrained = set(() if search.pair == "auto" else search.pair) - set(model.detectors)
     if untrained:
         return None, f"the model was trained without {', '.join(sorted(untrained))}"
-    trained = SearchConfig(descriptors=model.descriptors, vote=model.vote, weights=model.weights)
+    trained = SearchConfig(
+        descriptors=_in_order(model.descriptors), vote=model.vote, weights=model.weights
+    )
     asked = search.model_copy(
         update={
-            "descriptors": descriptors_of(index, search),
+            "descriptors": _in_order(descriptors_of(index, search)),
             "weights": tuple(sorted(search.weights)),
             "pair": trained.pair,
             "k": trained.k,
@@ -112,3 +131,8 @@ def fitting_model(index: Configured, search: SearchConfig) -> tuple[ChoiceModel 
     if trained != asked:
         return None, "the model was trained with other descriptors, vote or weights"
     return model, ""
+
+
+def _in_order(descriptors: Sequence[Descriptor]) -> tuple[Descriptor, ...]:
+    """As they are always listed: their order means nothing to a search."""
+    return tuple(name for name in DESCRIPTORS if name in descriptors)

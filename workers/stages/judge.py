@@ -41,13 +41,13 @@ def judge_photo(request: JudgeMessage) -> dict[str, Any]:
         photo = read_query(index, request)
     except UnusableImage as error:
         return {"query": request.query, "error": str(error)}
-    chosen = choose(index, photo, request.search)
-    scores = search_photo(index, photo, chosen, request.search)
-    ranking = full_ranking(scores)
-    seconds = time.perf_counter() - started
     relevant, junk = set(request.relevant), junk_of(index, photo, request)
     if not relevant - junk:
         return {"query": request.query, "excluded": True}
+    chosen = choose(index, photo, request.search, junk)
+    scores = search_photo(index, photo, chosen, request.search)
+    ranking = full_ranking(scores)
+    seconds = time.perf_counter() - started
     result = judge(request.query, ranking, relevant, junk, chosen.detectors, chosen.k, seconds)
     top = [
         {
