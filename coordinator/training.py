@@ -1,6 +1,6 @@
 """Training: rehearsed queries become the model that chooses detectors and k."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,11 @@ def train_model(
     WrongInput : fewer than two places are left.
     """
     return fit_choice(
-        trials_of(answers, places_of(queries), [set_name] * len(answers)),
+        trials_of(
+            answers,
+            places_of(queries, own_images(queries, answers)),
+            [set_name] * len(answers),
+        ),
         detectors=index.config.features.detectors,
         descriptors=search.descriptors or index.config.features.descriptors,
         vote=search.vote,
@@ -86,15 +90,29 @@ def _candidate(row: Sequence[Any]) -> Candidate:
     return (first, second), int(row[2])
 
 
-def places_of(queries: Sequence[JudgedQuery]) -> dict[str, str]:
-    """The place of each query: queries that share a relevant image are of one place."""
+def own_images(queries: Sequence[JudgedQuery], answers: Sequence[Json]) -> dict[str, set[int]]:
+    """The indexed images that a query is itself: junk that the truth does not name."""
+    return {
+        query.query: set(answer.get("junk", ())) - set(query.junk)
+        for query, answer in zip(queries, answers, strict=True)
+    }
+
+
+def places_of(
+    queries: Sequence[JudgedQuery], own: Mapping[str, Collection[int]] | None = None
+) -> dict[str, str]:
+    """The place of each query: queries that share a relevant image are of one place.
+
+    own : by query the indexed images that it is itself, which belong to its place too.
+    """
     place_of_image: dict[int, str] = {}
     places: dict[str, str] = {}
     for each in queries:
-        met = {place_of_image[image] for image in each.relevant if image in place_of_image}
+        members = {*each.relevant, *(own or {}).get(each.query, ())}
+        met = {place_of_image[image] for image in members if image in place_of_image}
         place = min(met, default=each.query)
         places[each.query] = place
-        for image in each.relevant:
+        for image in members:
             place_of_image[image] = place
         for absorbed in met - {place}:
             place_of_image = {

@@ -54,7 +54,7 @@ def command(
     from coordinator.querying import Rules, rehearse_queries
     from coordinator.training import train_model
     from coordinator.truth import read_truth
-    from index.models import write_model
+    from index.models import model_path, write_model
     from index.opened import OpenedIndex
     from workers.stages.choose import KS
 
@@ -65,6 +65,8 @@ def command(
     catalogue = opened.catalogue
     queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
     check_comparable(opened, queries)
+    if out is None:
+        model_path(opened.root).parent.mkdir(exist_ok=True)  # or fail before the work
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:
         progress.begin("train", len(queries), 0)
         answers = rehearse_queries(

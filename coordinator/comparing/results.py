@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contracts.config import SearchConfig, Vote, Weight
 from coordinator.querying import votes_file
-from coordinator.training import places_of, trials_of
+from coordinator.training import own_images, places_of, trials_of
 from coordinator.truth import JudgedQuery
 from index.opened import OpenedIndex
 from index.votes import read_outcomes, read_votes
@@ -75,7 +75,8 @@ def results_of(
     WrongInput : no query could be judged, or all lie at one place.
     """
     judged = ["together" in answer for answer in answers]
-    places = {query: prefix + place for query, place in places_of(queries).items()}
+    own = own_images(queries, answers)
+    places = {query: prefix + place for query, place in places_of(queries, own).items()}
     trials = trials_of(answers, places, set_names)
     check_groups(trials.places)
     files = [votes_file(votes_folder, at) for at in np.flatnonzero(judged).tolist()]

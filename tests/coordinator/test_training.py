@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contracts.errors import WrongInput
-from coordinator.training import places_of, trials_of
+from coordinator.training import own_images, places_of, trials_of
 from coordinator.truth import JudgedQuery
 from retrieval.candidates import FEATURES
 
@@ -63,3 +63,15 @@ def test_a_single_detector_has_no_pairs_to_choose_from() -> None:
     alone: dict[str, Any] = {"query": "a", "features": [], "together": []}
     with pytest.raises(WrongInput, match="only one detector"):
         trials_of([alone], {"a": "here"}, ["x"])
+
+
+def test_queries_that_are_each_others_answer_are_of_one_place() -> None:
+    queries = [
+        JudgedQuery("a.jpg", Path("a.jpg"), (1,)),
+        JudgedQuery("b.jpg", Path("b.jpg"), (0,)),
+        JudgedQuery("c.jpg", Path("c.jpg"), (3,), junk=(0, 2)),
+    ]
+    answers: list[dict[str, Any]] = [{"junk": [0]}, {"junk": [1]}, {"junk": [0, 2, 4]}]
+    own = own_images(queries, answers)
+    assert own == {"a.jpg": {0}, "b.jpg": {1}, "c.jpg": {4}}
+    assert places_of(queries, own) == {"a.jpg": "a.jpg", "b.jpg": "a.jpg", "c.jpg": "c.jpg"}

@@ -152,7 +152,9 @@ def test_k_alone_may_be_given(
     # No pair was tried with 4: the best with 5 is taken.
     nearest = asked(trained(known, variant), SearchConfig(k=5))
     assert asked(trained(known, variant), SearchConfig(k=4)).groups == nearest.groups
-    assert asked(trained(known, variant), SearchConfig(k=4)).k == 4
+    other = asked(trained(known, variant), SearchConfig(k=4))
+    assert (other.k, other.predicted_map) == (4, None)
+    assert other.choice.endswith(" with k = 5")
 
 
 @pytest.mark.parametrize("pair", [("hesaff", "star"), ("star", "hesaff")])

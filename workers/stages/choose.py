@@ -44,8 +44,9 @@ def choose(
         k = search.k if search.k != "auto" else DEFAULT_K
         return Chosen((pair,), k, None, f"default: {why_not}")
     made = _by_model(model, index, photo, search, junk)
-    k = made.k if search.k == "auto" else search.k
-    return Chosen(made.pairs, k, made.predicted_map, made.reason)
+    if search.k == "auto" or search.k == made.k:
+        return Chosen(made.pairs, made.k, made.predicted_map, made.reason)
+    return Chosen(made.pairs, search.k, None, f"{made.reason} with k = {made.k}")
 
 
 def _by_model(
