@@ -112,15 +112,17 @@ def write_comparison(out: Path, results: Results) -> None:
         "[paper]: Bhowmik et al., JURSE 2017, on data that we do not have: for proportions.",
     )
     by_name = {table.name: table for table in tables}
-    write_whole(
-        out / "table-1.png",
-        draw_intervals(
-            by_name["table-1"], "measured mAP", "pair", paper=f"mAP' {paper.PARIS} [paper]"
-        ),
-    )
-    write_whole(out / "controls.png", draw_intervals(by_name["controls"], "mAP", "choice"))
-    write_whole(out / "sets.png", draw_intervals(by_name["sets"], "mAP", "way", group="set"))
-    differences = draw_intervals(by_name["differences"], "mAP", "difference", group="set")
-    write_whole(out / "differences.png", differences)
+    paris = f"{paper.PARIS} [paper]"
+    for name, value, label, group, printed in (
+        ("table-1", "measured mAP", "pair", None, f"mAP' {paris}"),
+        ("table-2", "mAP", "fusion", "pair", paris),
+        ("table-3", "k = 2", "detector", None, paris),
+        ("table-4", "mAP", "k", "choice", paris),
+        ("controls", "mAP", "choice", None, None),
+        ("sets", "mAP", "way", "set", None),
+        ("differences", "mAP", "difference", "set", None),
+    ):
+        drawn = draw_intervals(by_name[name], value, label, group, printed)
+        write_whole(out / f"{name}.png", drawn)
     panels = chosen_shares(results, made, paper.SHARE_OF_K_2[0])
     write_whole(out / "figure-2.png", draw_shares("Chosen by Eq. 1, place left out", panels))

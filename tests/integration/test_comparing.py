@@ -84,7 +84,8 @@ def test_tables_and_figures_are_written_and_votes_are_not_left_behind(
     text = (report / "tables.md").read_text(encoding="utf-8")
     for title in ("Table I", "Table II", "Table III", "Table IV", "controls", "Rules of fusion"):
         assert title in text
-    for name in ("table-1", "controls", "sets", "differences", "figure-2"):
+    tables = [f"table-{number}" for number in (1, 2, 3, 4)]
+    for name in (*tables, "controls", "sets", "differences", "figure-2"):
         assert (report / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert not list((opened.root / "rehearsals").iterdir())
 
