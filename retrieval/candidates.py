@@ -15,7 +15,7 @@ from contracts.config import Detector
 from retrieval.complementarity import Complementarity
 from retrieval.fusion import Scores
 from retrieval.score_curves import agreement, curve_features
-from retrieval.ways import Sizes, Votes, joined_votes
+from retrieval.ways import Sizes, Votes, fused_group
 
 Pair = tuple[Detector, Detector]
 Candidate = tuple[Pair, int]
@@ -91,8 +91,7 @@ def candidate_features(
 
 
 def _ranked(look: FirstLook, group: tuple[Detector, ...], k: int) -> Scores:
-    sizes = None if look.sizes is None else [look.sizes[name] for name in group]
-    scores = joined_votes([look.votes[name, k] for name in group], sizes)
+    scores = fused_group(look.votes, group, k, look.sizes)
     if not look.junk:
         return scores
     touched: NDArray[np.bool_] = scores.touched.copy()

@@ -26,6 +26,7 @@ from retrieval.left_out import (
 )
 from retrieval.regression import (
     VARIANTS,
+    Regression,
     Variant,
     columns,
     feature_ranges,
@@ -74,6 +75,7 @@ def fit_choice(
     )
     picked = picked_by_others(trials, list(made.values()), trials.places)
     found = worth(trials, picked, beside, trials.places)
+    regression = fit_regression(trials, VARIANTS[name])
     means = trials.mean_ap()
     order = np.argsort(-means, kind="stable")
     return ChoiceModel(
@@ -83,8 +85,8 @@ def fit_choice(
         descriptors=descriptors,
         vote=vote,
         weights=tuple(sorted(weights)),
-        coefficients=_coefficients(trials, VARIANTS[name]),
-        level=fit_regression(trials, VARIANTS[name]).level,
+        coefficients=_coefficients(trials, regression),
+        level=regression.level,
         ranges=_ranges(trials, VARIANTS[name]),
         fixed=tuple(
             FixedScore(
@@ -118,9 +120,9 @@ def _range(interval: Interval) -> Range:
     return Range(mean=known(interval.mean), low=known(interval.low), high=known(interval.high))
 
 
-def _coefficients(trials: Trials, variant: Variant) -> tuple[Coefficient, ...]:
+def _coefficients(trials: Trials, regression: Regression) -> tuple[Coefficient, ...]:
     """Coefficients with their intervals over resampled places."""
-    values = fit_regression(trials, variant).coefficients
+    variant = regression.variant
     resampled = np.array(
         [fit_regression(trials, variant, times).coefficients for times in _draws(trials)]
     )
@@ -135,7 +137,7 @@ def _coefficients(trials: Trials, variant: Variant) -> tuple[Coefficient, ...]:
             high=float(most),
         )
         for column, value, least, most in zip(
-            columns(variant, trials.candidates), values, low, high, strict=True
+            columns(variant, trials.candidates), regression.coefficients, low, high, strict=True
         )
     )
 

@@ -53,17 +53,7 @@ def bootstrap_mean(
     ------
     WrongInput : no value, one that is not finite, labels or resamples that do not fit.
     """
-    _check(values, groups, n_resamples)
-    # Constant values must give an interval of no width, whatever the order of the additions.
-    origin = float(values[0])
-    shifted = values - origin
-    totals = _group_totals(np.column_stack([shifted, np.ones(len(values))]), groups)
-    mean = origin + float(shifted.mean())
-    if len(totals) == 1:
-        return Interval(mean, np.nan, np.nan)
-    resampled = _resample(totals, n_resamples, seed)
-    means = origin + resampled[:, 0] / resampled[:, 1]
-    return Interval(mean, _low(means), _high(means))
+    return weighted_mean(values, np.ones(values.shape), groups, n_resamples, seed)
 
 
 def weighted_mean(
@@ -84,8 +74,9 @@ def weighted_mean(
     WrongInput : as `bootstrap_mean`.
     """
     _check_pair(values, weights)
-    # Constant values must give an interval of no width, as in `bootstrap_mean`.
-    origin = float(values[0]) if len(values) else 0.0
+    _check(values, groups, n_resamples)
+    # Constant values must give an interval of no width, whatever the order of the additions.
+    origin = float(values[0])
     shifted = bootstrap_ratio((values - origin) * weights, weights, groups, n_resamples, seed)
     return Interval(origin + shifted.mean, origin + shifted.low, origin + shifted.high)
 

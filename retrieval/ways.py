@@ -59,6 +59,12 @@ def joined_votes(parts: Sequence[Scores], sizes: Sequence[NDArray[np.int64]] | N
     return Scores(values, np.any([part.touched for part in parts], axis=0))
 
 
+def fused_group(votes: Votes, group: Sequence[Detector], k: int, sizes: Sizes) -> Scores:
+    """Fuse some detectors for one k; see `joined_votes`."""
+    parts = [votes[name, k] for name in group]
+    return joined_votes(parts, None if sizes is None else [sizes[name] for name in group])
+
+
 def all_ways(
     votes: Votes, rule: tuple[Vote, tuple[Weight, ...]], sizes: Sizes, *, wide: bool
 ) -> Iterator[tuple[Way, Scores]]:
@@ -75,11 +81,11 @@ def all_ways(
     everything = [detectors] if len(detectors) > 2 else []
     triples = list(combinations(detectors, 3)) if len(detectors) > 3 else []
     for k in dict.fromkeys(k for _, k in votes):
-        alone = {name: _fused(votes, (name,), k, sizes) for name in detectors}
+        alone = {name: fused_group(votes, (name,), k, sizes) for name in detectors}
         for name, scores in alone.items():
             yield Way("single", *rule, (name,), k), scores
         for group in [*pairs, *triples, *everything] if wide else pairs:
-            yield Way("fii", *rule, group, k), _fused(votes, group, k, sizes)
+            yield Way("fii", *rule, group, k), fused_group(votes, group, k, sizes)
         for group in [*pairs, *everything] if wide else ():
             for method, late_fusion in LATE_FUSIONS.items():
                 yield Way(method, *rule, group, k), late_fusion([alone[name] for name in group])
@@ -119,7 +125,7 @@ def ap_together(
     -------
     (c, c) float64; on the diagonal that of one alone; NaN where two differ in k.
     """
-    rankings = [_fused(votes, pair, k, sizes) for pair, k in candidates]
+    rankings = [fused_group(votes, pair, k, sizes) for pair, k in candidates]
     joined = [standardised(scores) for scores in rankings]
     ap = np.full((len(candidates), len(candidates)), np.nan)
     for a, (_, k) in enumerate(candidates):
@@ -131,8 +137,3 @@ def ap_together(
                 )
                 ap[a, b] = ap[b, a] = judge_scores(both, relevant, junk).ap
     return ap
-
-
-def _fused(votes: Votes, group: Sequence[Detector], k: int, sizes: Sizes) -> Scores:
-    parts = [votes[name, k] for name in group]
-    return joined_votes(parts, None if sizes is None else [sizes[name] for name in group])

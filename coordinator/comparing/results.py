@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contracts.config import SearchConfig, Vote, Weight
+from contracts.config import Detector, SearchConfig, Vote, Weight
 from coordinator.querying import votes_file
 from coordinator.training import own_images, places_of, trials_of
 from coordinator.truth import JudgedQuery
@@ -21,7 +21,7 @@ from retrieval.left_out import check_groups
 from retrieval.resampling import Interval, weighted_mean
 from retrieval.score_curves import N_CURVE, Reference, query_adaptive, reference_curves
 from retrieval.trials import Trials, joined
-from retrieval.ways import Way, joined_votes
+from retrieval.ways import Sizes, Way, fused_group
 from workers.stages.retrieve import sizes_of
 
 Json = dict[str, Any]
@@ -121,12 +121,13 @@ def _query_adaptive(
 ) -> dict[int, NDArray[np.float64]]:
     """AP of query-adaptive late fusion; its reference curves come from queries of other places."""
     detectors = index.config.features.detectors
+    sizes = sizes_of(index, detectors, search)
     ks = tuple(sorted({k for _, k in trials.candidates}))
     found: dict[int, list[float]] = {k: [] for k in ks}
     for k in ks:
         # Votes are read twice: those of all queries at once may be more than the memory.
         curves = [
-            [_wrong_curve(scores, answer) for scores in _alone(file, index, search, k)]
+            [_wrong_curve(scores, answer) for scores in _alone(file, detectors, sizes, k)]
             for file, answer in zip(files, answers, strict=True)
         ]
         for number, (file, answer) in enumerate(zip(files, answers, strict=True)):
@@ -134,7 +135,7 @@ def _query_adaptive(
             references = [
                 _reference([curves[other][at] for other in others]) for at in range(len(detectors))
             ]
-            fused = query_adaptive(_alone(file, index, search, k), references)
+            fused = query_adaptive(_alone(file, detectors, sizes, k), references)
             found[k].append(judge_scores(fused, answer["relevant"], answer["junk"]).ap)
     return {k: np.array(values) for k, values in found.items()}
 
@@ -153,12 +154,7 @@ def _wrong_curve(scores: Scores, answer: Json) -> NDArray[np.float64]:
     return reference_curves([scores], [known]).curves
 
 
-def _alone(file: Path, index: OpenedIndex, search: SearchConfig, k: int) -> list[Scores]:
+def _alone(file: Path, detectors: tuple[Detector, ...], sizes: Sizes, k: int) -> list[Scores]:
     """Each detector's own answer to a query, from its votes."""
-    detectors = index.config.features.detectors
     votes = read_votes(file, detectors, (k,))
-    sizes = sizes_of(index, detectors, search)
-    return [
-        joined_votes([votes[name, k]], None if sizes is None else [sizes[name]])
-        for name in detectors
-    ]
+    return [fused_group(votes, (name,), k, sizes) for name in detectors]

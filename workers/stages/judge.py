@@ -1,7 +1,7 @@
 """Judge: what the ranking of a photo is worth where the truth is known."""
 
 import time
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,14 +36,10 @@ def judge_photo(request: JudgeMessage) -> dict[str, Any]:
     place.
     """
     started = time.perf_counter()
-    index = open_index(request.index, request.generation)
-    try:
-        photo = read_query(index, request)
-    except UnusableImage as error:
-        return {"query": request.query, "error": str(error)}
-    relevant, junk = set(request.relevant), junk_of(index, photo, request)
-    if not relevant - junk:
-        return {"query": request.query, "excluded": True}
+    query = read_query(request)
+    if not isinstance(query, Query):
+        return query
+    index, photo, relevant, junk = query.index, query.photo, query.relevant, query.junk
     chosen = choose(index, photo, request.search, junk)
     scores = search_photo(index, photo, chosen, request.search)
     ranking = full_ranking(scores)
@@ -61,17 +57,31 @@ def judge_photo(request: JudgeMessage) -> dict[str, Any]:
     return {**asdict(replace(result, choice=chosen.choice)), "top": top}
 
 
-def read_query(index: OpenedIndex, request: JudgeMessage) -> Photo:
-    """Decode a query; only what lies in its box is usable.
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A query that can be judged. relevant, junk : image ids; some relevant one is not junk."""
 
-    Raises
-    ------
-    UnusableImage : it cannot be read, or its box lies outside.
-    """
-    photo = read_photo(index, request.path)
-    if request.box is None:
-        return photo
-    return replace(photo, usable=_inside(request.box, photo.decoded))
+    index: OpenedIndex
+    photo: Photo
+    relevant: set[int]
+    junk: set[int]
+
+
+def read_query(request: JudgeMessage) -> Query | dict[str, Any]:
+    """Decode a query, only what lies in its box usable; or the answer that says why it is not."""
+    index = open_index(request.index, request.generation)
+    try:
+        photo = read_photo(index, request.path)
+        if request.box is not None:
+            photo = replace(photo, usable=_inside(request.box, photo.decoded))
+    except UnusableImage as error:
+        return {"query": request.query, "error": str(error)}
+    # What the truth calls junk, and the query itself where it is indexed too.
+    itself = index.images_by_sha256.get(photo.decoded.sha256, ())
+    query = Query(index, photo, set(request.relevant), {*request.junk, *itself})
+    if not query.relevant - query.junk:
+        return {"query": request.query, "excluded": True}
+    return query
 
 
 def _inside(box: tuple[float, float, float, float], decoded: DecodedImage) -> NDArray[np.bool_]:
@@ -87,8 +97,3 @@ def _inside(box: tuple[float, float, float, float], decoded: DecodedImage) -> ND
             f"{decoded.width_px} x {decoded.height_px}; correct the box or the photo"
         )
     return inside
-
-
-def junk_of(index: OpenedIndex, photo: Photo, request: JudgeMessage) -> set[int]:
-    """What the truth calls junk, and the query itself where it is indexed too."""
-    return {*request.junk, *index.images_by_sha256.get(photo.decoded.sha256, ())}

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from contracts.config import Weight
-from contracts.errors import UnusableImage
 from index.votes import write_outcomes, write_votes
 from retrieval.candidates import FirstLook, candidate_features
 from retrieval.ways import Outcome, ap_together, outcomes
 from workers.messages import RehearseMessage
-from workers.stages.judge import junk_of, read_query
-from workers.stages.retrieve import densities, detector_votes, open_index, sizes_of, words_of
+from workers.stages.judge import Query, read_query
+from workers.stages.retrieve import densities, detector_votes, sizes_of, words_of
 
 
 def rehearse_photo(request: RehearseMessage) -> dict[str, Any]:
@@ -23,14 +22,10 @@ def rehearse_photo(request: RehearseMessage) -> dict[str, Any]:
     The answers of all other ways are left in the file that the message names, if it does.
     `error` : it cannot be read. `excluded` : it is the only image of its place.
     """
-    index = open_index(request.index, request.generation)
-    try:
-        photo = read_query(index, request)
-    except UnusableImage as error:
-        return {"query": request.query, "error": str(error)}
-    relevant, junk = set(request.relevant), junk_of(index, photo, request)
-    if not relevant - junk:
-        return {"query": request.query, "excluded": True}
+    query = read_query(request)
+    if not isinstance(query, Query):
+        return query
+    index, photo, relevant, junk = query.index, query.photo, query.relevant, query.junk
     detectors = index.config.features.detectors
     own = (request.search.vote, _ordered(request.search.weights))
     answer: dict[str, Any] = {
@@ -40,6 +35,7 @@ def rehearse_photo(request: RehearseMessage) -> dict[str, Any]:
     }
     found: list[Outcome] = []
     words = words_of(index, photo, detectors, max(request.ks), request.search)
+    distinct = sizes_of(index, detectors, request.search.model_copy(update={"weights": ("norm",)}))
     weightings = [_ordered(each) for each in request.weightings]
     for vote, base in product(request.votes, dict.fromkeys(map(_without_norm, weightings))):
         search = request.search.model_copy(update={"vote": vote, "weights": base})
@@ -47,8 +43,7 @@ def rehearse_photo(request: RehearseMessage) -> dict[str, Any]:
         for weights in weightings:
             if _without_norm(weights) != base:
                 continue
-            weighted = search.model_copy(update={"weights": weights})
-            sizes = sizes_of(index, detectors, weighted)
+            sizes = distinct if "norm" in weights else None
             rule = (vote, weights)
             if request.keep is not None:
                 found += outcomes(votes, rule, sizes, relevant, junk, wide=rule == own)

@@ -19,7 +19,7 @@ from retrieval.detectors import detect
 from retrieval.fusion import ChannelQuery, Scores, fuse
 from retrieval.late_fusion import standardised_sum
 from retrieval.pyramid import Pyramid, build_pyramid
-from retrieval.ways import joined_votes
+from retrieval.ways import fused_group
 from survey import DecodedImage, decode_image
 
 WordsFound = dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]
@@ -216,11 +216,5 @@ def search_photo(index: OpenedIndex, photo: Photo, chosen: Chosen, search: Searc
     words = words_of(index, photo, chosen.detectors, chosen.k, search)
     votes = detector_votes(index, words, (chosen.k,), search)
     sizes = sizes_of(index, chosen.detectors, search)
-    rankings = [
-        joined_votes(
-            [votes[name, chosen.k] for name in group],
-            None if sizes is None else [sizes[name] for name in group],
-        )
-        for group in chosen.groups
-    ]
+    rankings = [fused_group(votes, group, chosen.k, sizes) for group in chosen.groups]
     return rankings[0] if len(rankings) == 1 else standardised_sum(rankings)
