@@ -1,7 +1,8 @@
 """What many tests need: real data where it is, a small survey, a running engine."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 from workers.run import worker_environment
@@ -12,7 +13,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from contracts.config import IndexConfig
+from coordinator.cli.show import Bars
 from coordinator.engine import Engine, running_engine
+from coordinator.indexing import run_job
+from coordinator.plan import make_plan, read_surveys
+from index.opened import OpenedIndex
+from survey import ReadOptions
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -55,3 +62,19 @@ def engine() -> Iterator[Engine]:
     """A real server and two real worker processes."""
     with running_engine(None, 2) as running:
         yield running
+
+
+@pytest.fixture(scope="session")
+def indexed(
+    small_survey: Path, tmp_path_factory: pytest.TempPathFactory, engine: Engine
+) -> Callable[[IndexConfig], OpenedIndex]:
+    """Index the small survey by a configuration, in a folder of its own."""
+
+    def made(config: IndexConfig) -> OpenedIndex:
+        root = tmp_path_factory.mktemp("index")
+        intake = read_surveys([("", small_survey)], ReadOptions(crs="EPSG:2154"))
+        job, plan = make_plan(root, intake, config, 4)
+        run_job(job, plan, intake, nullcontext(engine), Bars(None))
+        return OpenedIndex(root)
+
+    return made

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from contextlib import nullcontext
+from collections.abc import Callable
 from pathlib import Path
 
 import flaneur_command
@@ -15,13 +15,10 @@ from contracts.errors import WrongInput
 from coordinator.cli.show import Bars
 from coordinator.comparing.report import check_comparable, compare
 from coordinator.engine import Engine
-from coordinator.indexing import run_job
-from coordinator.plan import make_plan, read_surveys
 from coordinator.querying import WEIGHTINGS, Rules, judge_queries
 from coordinator.truth import JudgedQuery, read_truth
 from index.opened import OpenedIndex
 from retrieval.choice import ChoiceModel
-from survey import ReadOptions
 
 CONFIG = IndexConfig(
     features=FeatureConfig(detectors=("hesaff", "mser", "star"), max_frames=150),
@@ -31,14 +28,8 @@ N_QUERIES = 5
 
 
 @pytest.fixture(scope="module")
-def opened(
-    small_survey: Path, tmp_path_factory: pytest.TempPathFactory, engine: Engine
-) -> OpenedIndex:
-    root = tmp_path_factory.mktemp("compared")
-    intake = read_surveys([("", small_survey)], ReadOptions(crs="EPSG:2154"))
-    job, plan = make_plan(root, intake, CONFIG, 4)
-    run_job(job, plan, intake, nullcontext(engine), Bars(None))
-    return OpenedIndex(root)
+def opened(indexed: Callable[[IndexConfig], OpenedIndex]) -> OpenedIndex:
+    return indexed(CONFIG)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """From a ground truth on disk to judged rankings, through real workers."""
 
-from contextlib import nullcontext
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 
@@ -9,16 +9,12 @@ import pytest
 from PIL import Image
 
 from contracts.config import CodebookConfig, Detector, FeatureConfig, IndexConfig, SearchConfig
-from coordinator.cli.show import Bars
 from coordinator.engine import Engine
-from coordinator.indexing import run_job
-from coordinator.plan import make_plan, read_surveys
 from coordinator.querying import Json, Rules, judge_queries, rehearse_queries, votes_file
 from coordinator.truth import read_truth
 from index.opened import OpenedIndex
 from index.votes import read_outcomes, read_votes
 from retrieval.ways import Way
-from survey import ReadOptions
 
 CONFIG = IndexConfig(
     features=FeatureConfig(detectors=("hesaff", "mser"), max_frames=200),
@@ -29,14 +25,8 @@ ALL = [f"{number:02d}" for number in range(10)]
 
 
 @pytest.fixture(scope="module")
-def opened(
-    small_survey: Path, tmp_path_factory: pytest.TempPathFactory, engine: Engine
-) -> OpenedIndex:
-    root = tmp_path_factory.mktemp("judged")
-    intake = read_surveys([("", small_survey)], ReadOptions(crs="EPSG:2154"))
-    job, plan = make_plan(root, intake, CONFIG, 4)
-    run_job(job, plan, intake, nullcontext(engine), Bars(None))
-    return OpenedIndex(root)
+def opened(indexed: Callable[[IndexConfig], OpenedIndex]) -> OpenedIndex:
+    return indexed(CONFIG)
 
 
 def write_truth(folder: Path, query: str, good: list[str], junk: list[str]) -> Path:
