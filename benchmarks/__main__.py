@@ -4,7 +4,16 @@ import os
 import sys
 from pathlib import Path
 
-from benchmarks import complementarity, features, fusion, kth, pooled, stereopolis, workers
+from benchmarks import (
+    complementarity,
+    features,
+    fusion,
+    kth,
+    pooled,
+    poses,
+    stereopolis,
+    workers,
+)
 from benchmarks.sets import run as sets
 
 FIGURES = {"stereopolis": stereopolis.run, "kth": kth.run, "workers": workers.run}
@@ -14,6 +23,7 @@ BENCHMARKS = {
     "fusion": fusion.run,
     "complementarity": complementarity.run,
     "pooled": pooled.run,
+    "poses": poses.run,
     "sets": sets.run,
 }
 

@@ -67,13 +67,15 @@ def run(data: Path) -> None:
             index, rate, size = indices[options]
             with bars() as progress:
                 progress.begin("locate", len(queries), 0)
-                located = locate_photos(
-                    index,
-                    [query.photo for query in queries],
-                    search,
-                    engine.follower,
-                    lambda: progress.advance("locate"),
-                    plain=plain,
+                located = list(
+                    locate_photos(
+                        index,
+                        [query.photo for query in queries],
+                        search,
+                        engine.follower,
+                        lambda: progress.advance("locate"),
+                        plain=plain,
+                    )
                 )
             rows.append((name, *figures(index, queries, located), rate, size))
     where = f"within {NEAR_M:.0f} m of the first pass"

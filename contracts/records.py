@@ -15,7 +15,9 @@ class Pose:
     `easting` and `northing` are in the axis unit of `crs`, always x before y: metres for a
     projected system, degrees of longitude and latitude for a geographic one. `heading_deg` is
     clockwise from `north`, of the optical axis; `pitch_deg` is up positive; `roll_deg` is right
-    side down positive. None: not known.
+    side down positive. None: not known. `crs` may be compound or three-dimensional: then it says
+    from what `altitude_m` counts. `heading_derived`: the heading is the track's direction, not
+    measured. `position_error_m`: as the survey states it, horizontal.
     """
 
     easting: float
@@ -26,6 +28,8 @@ class Pose:
     pitch_deg: float | None = None
     roll_deg: float | None = None
     north: North = "grid"
+    heading_derived: bool = False
+    position_error_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +47,10 @@ class PosedImage:
     """One image of a survey, before it is numbered.
 
     `uri` is relative to its survey, NFC, with `/`, prefixed `NAME/` for `--also` surveys;
-    `path` can be opened. `quarter_turns` counter-clockwise turns of 90 degrees put the stored
-    image upright (after EXIF). `mask_path` is stored turned like the image; bright = not scenery.
+    `path` can be opened; `fragment` says what within that file is the image (a message of an MCAP
+    file, a view cut from a panorama; survey/fragments.py), "" = all of it. `quarter_turns`
+    counter-clockwise turns of 90 degrees put the stored image upright (after EXIF). `mask_path`
+    is stored turned like the image; bright = not scenery.
     `captured_at` is ISO 8601 with a zone, or None.
     """
 
@@ -55,6 +61,7 @@ class PosedImage:
     captured_at: str | None = None
     quarter_turns: int = 0
     mask_path: str | None = None
+    fragment: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.engine import Engine
-from coordinator.export.files import write_geojson
+from coordinator.export.geojson import provenance, write_geojson
 from coordinator.export.page import write_page
 from coordinator.export.sheets import QuerySheet, SheetMatch, thumbnail_jpeg
 from coordinator.indexing import IndexReport, Progress, run_job
@@ -78,7 +78,7 @@ def run_demo(
     progress.begin("render", 1, 0)
     demo = render_survey(out, options=shots)
     progress.advance("render")
-    intake = read_surveys([("", demo.survey)], ReadOptions(crs=demo.crs))
+    intake = read_surveys([("", demo.survey.absolute())], ReadOptions(crs=demo.crs))
     root = (out / "index").absolute()
     job, plan = make_plan(root, intake, CONFIG, SHARD_SIZE)
     report = run_job(job, plan, intake, nullcontext(engine), progress)
@@ -90,22 +90,21 @@ def run_demo(
     def advance() -> None:
         progress.advance("locate")
 
-    fused = locate_photos(index, photos, search, engine.follower, advance)
-    plain = locate_photos(index, photos, search, engine.follower, advance, plain=True)
+    fused = list(locate_photos(index, photos, search, engine.follower, advance))
+    plain = list(locate_photos(index, photos, search, engine.follower, advance, plain=True))
     judge = _Judge(demo, index)
     rows = tuple(
         DemoRow(query, judge.answer(query, ours), judge.answer(query, theirs), judge.chance(query))
         for query, ours, theirs in zip(demo.truth, fused, plain, strict=True)
     )
     features = [feature for located in fused for feature in located.features]
-    collection = feature_collection(features)
     geojson = out / "results.geojson"
-    write_geojson(geojson, collection)
+    write_geojson(geojson, features, provenance(index))
     page = out / "index.html"
     write_page(
         page.absolute(),
         "Flaneur: old photos of a town that never was",
-        collection,
+        feature_collection(features),
         [judge.sheet(row, located) for row, located in zip(rows, fused, strict=True)],
         attribution="Survey and photos rendered by Flaneur",
         track=judge.track(),
@@ -124,6 +123,7 @@ class _Judge:
         self._demo = demo
         self._to_wgs84 = ToWgs84(demo.crs)
         self._uris = index.catalogue.column("uri")
+        self._paths = index.catalogue.column("path")
         self._positions = index.catalogue.positions()
         self._chance = np.random.default_rng(0)
 
@@ -163,7 +163,7 @@ class _Judge:
                     image=match["image"],
                     rank=match["rank"],
                     score=match["score"],
-                    thumbnail_jpeg=thumbnail_jpeg(Path(match["uri"]), THUMBNAIL_PX),
+                    thumbnail_jpeg=thumbnail_jpeg(self._paths[match["image_id"]], THUMBNAIL_PX),
                     hit=self._sees(match["image"], row.query.facade),
                 )
                 for match in matches

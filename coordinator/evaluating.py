@@ -1,6 +1,6 @@
 """Evaluating: judged queries become the report of `flaneur evaluate`."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from coordinator.export.sheets import SheetMatch, thumbnail_jpeg
 from coordinator.export.tables import Table, markdown
 from coordinator.indexing import Progress
 from coordinator.truth import JudgedQuery
-from coordinator.truth.written import Box
 from index.catalogue import Catalogue, CatalogueRow
 from index.opened import OpenedIndex
 from retrieval.evaluation import QueryResult, summarise
@@ -141,20 +140,22 @@ class _Pictures:
                     hit=None if each["junk"] else each["hit"],
                 )
             )
-        photo = _thumbnail(query.path, PHOTO_PX, box=query.box)
+        photo = _picture(lambda: thumbnail_jpeg(query.path, PHOTO_PX, box=query.box))
         return JudgedSheet(_RESULT.validate_python(answer), photo, tuple(matches))
 
     def _of(self, row: CatalogueRow) -> bytes | None:
         if row.image_id not in self._made:
-            self._made[row.image_id] = _thumbnail(row.path, MATCH_PX, row.quarter_turns)
+            self._made[row.image_id] = _picture(
+                lambda: thumbnail_jpeg(
+                    row.path, MATCH_PX, fragment=row.fragment, quarter_turns=row.quarter_turns
+                )
+            )
         return self._made[row.image_id]
 
 
-def _thumbnail(
-    path: str | Path, side_px: int, quarter_turns: int = 0, box: Box | None = None
-) -> bytes | None:
+def _picture(made: Callable[[], bytes]) -> bytes | None:
     try:
-        return thumbnail_jpeg(path, side_px, quarter_turns, box)
+        return made()
     except UnusableImage:
         return None
 

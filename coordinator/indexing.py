@@ -2,18 +2,21 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from contracts.errors import BadSurvey
 from contracts.records import Receipt, Skipped
 from coordinator.engine import Engine
 from coordinator.follow import Follower, Order
 from coordinator.plan import Intake
+from geo.crs import area_of
 from index.catalogue import CatalogueRow, catalogue_row, write_catalogue
 from index.jobs import JobFolder, JobPlan
 from index.manifest import FileEntry, Generation, SurveyEntry, commit, live_generation
@@ -199,6 +202,8 @@ def _commit(job: JobFolder, plan: JobPlan, intake: Intake) -> Generation:
         config=plan.config,
         config_digest=plan.config_digest,
         crs=intake.crs,
+        area=_area(rows, intake.crs),
+        allow_ballpark=intake.allow_ballpark,
         n_images=len(rows),
         n_skipped=len(skipped),
         n_postings=n_postings,
@@ -220,6 +225,22 @@ def _commit(job: JobFolder, plan: JobPlan, intake: Intake) -> Generation:
     )
     commit(job.root, generation)
     return generation
+
+
+def _area(
+    rows: Sequence[CatalogueRow], crs: str | None
+) -> tuple[float, float, float, float] | None:
+    posed = [
+        (row.easting, row.northing)
+        for row in rows
+        if row.easting is not None and row.northing is not None
+    ]
+    if crs is None or not posed:
+        return None
+    area = area_of(crs, *np.array(posed).T)
+    if area is None:
+        return None
+    return area.west_lon_degree, area.south_lat_degree, area.east_lon_degree, area.north_lat_degree
 
 
 def _next_number(root: Path) -> int:

@@ -11,8 +11,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from contracts.config import IndexConfig
-from contracts.errors import BadConfig, BadIndex, BadSurvey, UnknownCrs
+from contracts.errors import BadConfig, BadIndex, BadSurvey
 from contracts.records import PosedImage, Skipped
+from geo.reprojection import reproject
 from index.jobs import JobFolder, JobPlan
 from survey import ReadOptions, Survey, read_survey
 
@@ -40,14 +41,18 @@ class Intake:
     """The survey of each image."""
     skipped: tuple[Skipped, ...]
     crs: str | None
+    notes: tuple[str, ...]
+    allow_ballpark: bool
 
 
 def read_surveys(sources: Sequence[tuple[str, Path]], options: ReadOptions) -> Intake:
     """Read every survey; `sources` are (name, path), the main survey's name is ''.
 
+    The first survey with poses gives the CRS, those in another are converted into it.
+
     Raises
     ------
-    BadSurvey : one is empty or no survey. UnknownCrs : they have different CRSs.
+    BadSurvey : one is empty or no survey. UnknownCrs : a CRS cannot be converted.
     BadConfig : two have the same name.
     """
     name, count = Counter(name for name, _ in sources).most_common(1)[0]
@@ -57,12 +62,9 @@ def read_surveys(sources: Sequence[tuple[str, Path]], options: ReadOptions) -> I
         NamedSurvey(name, path, read_survey(path, _renamed(options, name)))
         for name, path in sources
     )
-    systems = {named.survey.crs for named in surveys if named.survey.crs is not None}
-    if len(systems) > 1:
-        raise UnknownCrs(
-            f"The surveys are in {' and '.join(sorted(systems))}; one index has one CRS. "
-            "Convert one of them, or index them separately."
-        )
+    crs = next((named.survey.crs for named in surveys if named.survey.crs is not None), None)
+    if crs is not None:
+        surveys = tuple(_in_crs(named, crs, options.allow_ballpark) for named in surveys)
     tagged = sorted(
         ((image, named.name) for named in surveys for image in named.survey.images),
         key=lambda pair: pair[0].uri.encode(),
@@ -80,8 +82,39 @@ def read_surveys(sources: Sequence[tuple[str, Path]], options: ReadOptions) -> I
         images=images,
         survey_names=tuple(name for _, name in tagged),
         skipped=tuple(skip for named in surveys for skip in named.survey.skipped),
-        crs=next(iter(systems), None),
+        crs=crs,
+        notes=tuple(note for named in surveys for note in named.survey.notes),
+        allow_ballpark=options.allow_ballpark,
     )
+
+
+def _in_crs(named: NamedSurvey, crs: str, allow_ballpark: bool) -> NamedSurvey:
+    """A survey with its poses in the CRS of the index, and a note of how they were converted."""
+    survey = named.survey
+    if survey.crs in {crs, None}:
+        return named
+    posed = [row for row, image in enumerate(survey.images) if image.pose is not None]
+    poses = [pose for image in survey.images if (pose := image.pose) is not None]
+    found = reproject(poses, crs, allow_ballpark)
+    images = list(survey.images)
+    for row, pose in zip(posed, found.poses, strict=True):
+        images[row] = replace(images[row], pose=pose)
+    notes = [
+        f"{named.name}: converted from {former} into {crs} by {operation.name} "
+        f"({_accuracy(operation.accuracy_m)})"
+        for former, operation in found.operations.items()
+    ]
+    if found.altitudes_dropped:
+        notes.append(
+            f"{named.name}: {found.altitudes_dropped} altitudes dropped, which count from "
+            f"something else than those of {crs}"
+        )
+    survey = replace(survey, images=tuple(images), crs=crs, notes=(*survey.notes, *notes))
+    return replace(named, survey=survey)
+
+
+def _accuracy(metres: float | None) -> str:
+    return "of unknown accuracy" if metres is None else f"to {metres:g} m"
 
 
 def _renamed(options: ReadOptions, name: str) -> ReadOptions:
@@ -156,9 +189,11 @@ def _plan_of(job: JobFolder) -> JobPlan:
 
 def _job_id(intake: Intake, config: IndexConfig) -> str:
     digest = hashlib.sha256(config.digest().encode())
+    # Many images may lie in one file.
+    states = {path: Path(path).stat() for path in {image.path for image in intake.images}}
     for image in intake.images:
-        status = Path(image.path).stat()
-        digest.update(f"{image!r} {status.st_size} {status.st_mtime_ns}\n".encode())
+        state = states[image.path]
+        digest.update(f"{image!r} {state.st_size} {state.st_mtime_ns}\n".encode())
     return digest.hexdigest()[:16]
 
 

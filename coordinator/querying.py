@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from contracts.config import SearchConfig, Vote, Weight
 from contracts.errors import TaskFailed
-from coordinator.follow import Follower, Order
+from coordinator.follow import Follower, Order, Outcome
 from coordinator.truth import JudgedQuery
 from geo.geojson import Feature, Kind, error_feature
 from index.opened import OpenedIndex
@@ -22,6 +22,10 @@ WEIGHTINGS: tuple[tuple[Weight, ...], ...] = (
     ("burst", "idf", "norm"),
 )
 """Sets of weights that an evaluation compares."""
+
+WINDOW = 1000
+"""Photos sent before the first of them must be answered. Workers wait for one another once a
+window: a photo's time in a thousand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,34 +81,47 @@ def locate_photos(
     advance: Callable[[], None],
     *,
     plain: bool = False,
-) -> list[Located]:
-    """Locate photos as a batch; one that fails becomes an error feature and stops no other.
+) -> Iterator[Located]:
+    """Locate photos as a batch, in the order given, each handed on as soon as it can be.
+
+    One that fails becomes an error feature and stops no other. Nothing is sent before the first
+    answer is asked for. Answers that come before their turn are held: those of a window, so that
+    memory does not grow with the batch.
 
     plain : by the baseline, a bag of words.
+
+    Raises
+    ------
+    BadIndex, BadConfig : as a worker found, and so for every photo.
     """
-    orders = (
-        Order(
-            "locate",
-            str(number),
-            {**_message(index, photo, Path(photo), search), "plain": plain},
-        )
-        for number, photo in enumerate(photos)
-    )
-    answers: dict[int, Located] = {}
-    for outcome in follower.outcomes(orders):
-        number = int(outcome.order.key)
-        query = photos[number]
-        if outcome.wrong_index is not None:
-            raise outcome.wrong_index
-        if outcome.value is None:
-            features = (error_feature(query, str(outcome.error)),)
-            answers[number] = Located(query, features, 0.0)
-        else:
-            answers[number] = Located(
-                query, tuple(outcome.value["features"]), outcome.value["seconds"]
+    for begin in range(0, len(photos), WINDOW):
+        window = range(begin, min(begin + WINDOW, len(photos)))
+        orders = (
+            Order(
+                "locate",
+                str(number),
+                {**_message(index, photos[number], Path(photos[number]), search), "plain": plain},
             )
-        advance()
-    return [answers[number] for number in range(len(photos))]
+            for number in window
+        )
+        held: dict[int, Located] = {}
+        turns = iter(window)
+        turn = next(turns)
+        for outcome in follower.outcomes(orders):
+            number = int(outcome.order.key)
+            held[number] = _located(photos[number], outcome)
+            advance()
+            while turn in held:
+                yield held.pop(turn)
+                turn = next(turns, -1)
+
+
+def _located(query: str, outcome: Outcome) -> Located:
+    if outcome.wrong_index is not None:
+        raise outcome.wrong_index
+    if outcome.value is None:
+        return Located(query, (error_feature(query, str(outcome.error)),), 0.0)
+    return Located(query, tuple(outcome.value["features"]), outcome.value["seconds"])
 
 
 def judge_queries(

@@ -4,29 +4,32 @@ Every easting and northing is x before y (`always_xy`), whatever order the autho
 """
 
 import functools
-import math
-import warnings
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import pyproj
 from numpy.typing import ArrayLike, NDArray
-from pyproj.exceptions import CRSError, ProjError
-from pyproj.transformer import TransformerGroup
+from pyproj.exceptions import CRSError
+from pyproj.transformer import AreaOfInterest
 
 from contracts.errors import UnknownCrs
+from geo.grids import MapGrid, map_grid
+from geo.heights import Heights, heights_of
+from geo.operations import Converter, Operation, best_converter
+from geo.spans import narrowest_span_deg, within_180
 
-_WGS84 = "EPSG:4326"
+_WGS84 = pyproj.CRS("EPSG:4326")
 
 
-def parse_crs(text: str) -> pyproj.CRS:
-    """The horizontal coordinate reference system that `text` names.
+@functools.lru_cache(maxsize=256)
+def parse_full_crs(text: str) -> pyproj.CRS:
+    """The coordinate reference system that `text` names, heights included.
 
     Parameters
     ----------
-    text : what PROJ understands: an authority's code such as `EPSG:2154`, WKT, PROJJSON or a
-        PROJ string. Of a compound or three-dimensional system the horizontal part is kept; a
-        bound one keeps its own shift to WGS 84.
+    text : what PROJ understands: an authority's code such as `EPSG:2154`, two of them joined
+        (`EPSG:2154+5720`), WKT, PROJJSON or a PROJ string.
 
     Raises
     ------
@@ -47,43 +50,98 @@ def parse_crs(text: str) -> pyproj.CRS:
             "easting and northing on the Earth; give a projected or geographic one, such as "
             "EPSG:2154 or EPSG:4326"
         )
-    return horizontal
+    return named
 
 
-def _horizontal(crs: pyproj.CRS) -> pyproj.CRS:
-    if crs.is_compound:
-        if crs.is_bound and crs.source_crs is not None:
-            crs = crs.source_crs
-        return _horizontal(crs.sub_crs_list[0])
-    if crs.is_vertical or crs.is_geocentric or crs.is_engineering:
-        return crs
-    return crs.to_2d() if len(crs.axis_info) == 3 else crs
+@functools.lru_cache(maxsize=256)
+def parse_crs(text: str) -> pyproj.CRS:
+    """The horizontal coordinate reference system that `text` names.
+
+    Of a compound or three-dimensional system (see `parse_full_crs`) the horizontal part is kept;
+    a bound one keeps its own shift to WGS 84.
+
+    Raises
+    ------
+    UnknownCrs : as `parse_full_crs`.
+    """
+    return _horizontal(parse_full_crs(text))
+
+
+@functools.lru_cache(maxsize=64)
+def grid_of(text: str) -> MapGrid:
+    """The grid of a system's horizontal part: convergence, and places so many metres away."""
+    return map_grid(parse_crs(text))
+
+
+def area_of(text: str, easting: ArrayLike, northing: ArrayLike) -> AreaOfInterest | None:
+    """The part of the Earth where points lie, which may cross longitude 180; None: no points.
+
+    Parameters
+    ----------
+    easting, northing : (n,) in the axis unit of the system, x before y; NaN is passed over.
+
+    Notes
+    -----
+    The datum is left out: it moves a place by less than 0.01 degrees.
+    """
+    grid = grid_of(text)
+    lon, lat = grid.degrees(*_two_vectors(easting, northing))
+    known = np.isfinite(lon)
+    if not known.any():
+        return None
+    west, east = narrowest_span_deg(within_180(lon[known] + grid.prime_meridian_deg))
+    return AreaOfInterest(west, float(lat[known].min()), east, float(lat[known].max()))
 
 
 @dataclass(frozen=True, slots=True)
 class ToWgs84:
-    """From one coordinate system to WGS 84 and back, the best operation for every point.
+    """From one coordinate system to WGS 84 and back.
+
+    crs_text : see `parse_full_crs`.
+    area : where the points of the survey lie (`area_of`; or let `over` find it): one operation is
+        chosen for all of it, the best. None: PROJ chooses for each point.
+    allow_ballpark : whether a conversion is taken whose error nobody knows.
 
     Raises
     ------
-    UnknownCrs : when built, if `crs_text` is not a horizontal system (see `parse_crs`) or PROJ
-        has only a ballpark conversion, whose error nobody knows.
+    UnknownCrs : when built, if `crs_text` is not a horizontal system, or PROJ has only a ballpark
+        conversion and that is not allowed.
     """
 
     crs_text: str
+    area: AreaOfInterest | None = None
+    allow_ballpark: bool = False
 
     def __post_init__(self) -> None:
-        _transformer(self.crs_text)
+        grid_of(self.crs_text)
+        self._converter()
+
+    @classmethod
+    def over(
+        cls, crs_text: str, easting: ArrayLike, northing: ArrayLike, allow_ballpark: bool = False
+    ) -> Self:
+        """For a survey with these points, (n,) in the axis unit of the system, x before y."""
+        return cls(crs_text, area_of(crs_text, easting, northing), allow_ballpark)
 
     @property
     def crs(self) -> pyproj.CRS:
         """The horizontal system that is converted from."""
-        return _cached_crs(self.crs_text)
+        return parse_crs(self.crs_text)
+
+    @property
+    def operation(self) -> Operation:
+        """How longitudes and latitudes are come by, to be told with every result."""
+        return self._converter().operation
 
     @property
     def missing_grids(self) -> tuple[str, ...]:
         """Names of shift grids that would convert better but are not on this machine, sorted."""
-        return _missing_grids(self.crs_text)
+        return self.operation.missing_grids
+
+    @property
+    def heights(self) -> Heights:
+        """Whether `positions` knows heights, and if not, why."""
+        return _heights(self.crs_text, self.area)
 
     def lon_lat(
         self, easting: ArrayLike, northing: ArrayLike
@@ -103,18 +161,43 @@ class ToWgs84:
         UnknownCrs : a point has no position on the Earth in this system.
         """
         x, y = _two_vectors(easting, northing)
-        lon, lat = _transformer(self.crs_text).transform(x, y)
+        lon, lat = self._converter().transformer.transform(x, y)
         lon_deg, lat_deg = np.asarray(lon, np.float64), np.asarray(lat, np.float64)
         good = np.isfinite(lon_deg) & np.isfinite(lat_deg) & (np.abs(lat_deg) <= 90.0)
         self._refuse_unless(good, x, y)
-        return _within_180(lon_deg), lat_deg
+        return within_180(lon_deg), lat_deg
+
+    def positions(
+        self, easting: ArrayLike, northing: ArrayLike, altitude_m: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """WGS 84 longitude, latitude and height above its ellipsoid of points.
+
+        Parameters
+        ----------
+        easting, northing : (n,) in the axis unit of the system, x before y.
+        altitude_m : (n,) metres, whatever the system's unit; NaN: not known.
+
+        Returns
+        -------
+        lon_deg, lat_deg : (n,) float64 as `lon_lat`. height_m : (n,) float64, NaN where it is not
+        known: the system does not say from what altitudes count, a geoid grid is missing
+        (`heights` names it) or has no value there.
+
+        Raises
+        ------
+        UnknownCrs : a point has no position on the Earth in this system.
+        """
+        x, y = _two_vectors(easting, northing)
+        altitude = _two_vectors(x, altitude_m)[1]
+        lon, lat = self.lon_lat(x, y)
+        return lon, lat, self.heights.above_ellipsoid_m(x, y, altitude)
 
     def from_lon_lat(
         self, lon_deg: ArrayLike, lat_deg: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Easting and northing, (n,) float64 each, of WGS 84 points; errors as `lon_lat`."""
         lon, lat = _two_vectors(lon_deg, lat_deg)
-        x, y = _transformer(self.crs_text).transform(lon, lat, direction="INVERSE")
+        x, y = self._converter().transformer.transform(lon, lat, direction="INVERSE")
         easting, northing = np.asarray(x, np.float64), np.asarray(y, np.float64)
         self._refuse_unless(np.isfinite(easting) & np.isfinite(northing), lon, lat)
         return easting, northing
@@ -139,24 +222,12 @@ class ToWgs84:
         UnknownCrs : a point has no position on the Earth in this system.
         """
         x, y = _two_vectors(easting, northing)
-        if self.crs.is_geographic or x.size == 0:
-            return np.zeros_like(x)
-        projection = _projection(self.crs_text)
-        lon, lat = projection(x, y, inverse=True)
-        self._refuse_unless(np.isfinite(lon) & np.isfinite(lat), x, y)
-        try:
-            # PROJ gives longitudes from Greenwich but takes them here from the system's own
-            # prime meridian.
-            factors = projection.get_factors(
-                np.asarray(lon) - _prime_meridian_deg(self.crs), lat, errcheck=True
-            )
-        except ProjError as error:
-            raise UnknownCrs(
-                f"{self.crs.name}: no meridian convergence at some of the {x.size} points, "
-                f"easting {x.min():g} to {x.max():g}, northing {y.min():g} to {y.max():g}; "
-                "check that the coordinates belong to this system (--crs)"
-            ) from error
-        return np.asarray(factors.meridian_convergence, np.float64)
+        convergence = grid_of(self.crs_text).convergence_deg(x, y)
+        self._refuse_unless(np.isfinite(convergence), x, y)
+        return convergence
+
+    def _converter(self) -> Converter:
+        return _wgs84_converter(self.crs_text, self.area, self.allow_ballpark)
 
     def _refuse_unless(
         self, good: NDArray[np.bool_], x: NDArray[np.float64], y: NDArray[np.float64]
@@ -180,56 +251,21 @@ def _two_vectors(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     return first, second
 
 
-def _within_180(lon_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    outside = np.abs(lon_deg) > 180.0
-    return np.where(outside, (lon_deg + 180.0) % 360.0 - 180.0, lon_deg)
+def _horizontal(crs: pyproj.CRS) -> pyproj.CRS:
+    if crs.is_compound:
+        if crs.is_bound and crs.source_crs is not None:
+            crs = crs.source_crs
+        return _horizontal(crs.sub_crs_list[0])
+    if crs.is_vertical or crs.is_geocentric or crs.is_engineering:
+        return crs
+    return crs.to_2d() if len(crs.axis_info) == 3 else crs
 
 
-@functools.cache
-def _cached_crs(crs_text: str) -> pyproj.CRS:
-    return parse_crs(crs_text)
+@functools.lru_cache(maxsize=64)
+def _wgs84_converter(crs_text: str, area: AreaOfInterest | None, allow_ballpark: bool) -> Converter:
+    return best_converter(parse_crs(crs_text), _WGS84, area, allow_ballpark)
 
 
-@functools.cache
-def _projection(crs_text: str) -> pyproj.Proj:
-    with warnings.catch_warnings():
-        # A PROJ string drops the name and the datum of the system: here only its formulae count.
-        warnings.simplefilter("ignore", UserWarning)
-        return pyproj.Proj(_cached_crs(crs_text))
-
-
-def _prime_meridian_deg(crs: pyproj.CRS) -> float:
-    meridian = crs.prime_meridian
-    if meridian is None:
-        return 0.0
-    return math.degrees(meridian.longitude * float(meridian.unit_conversion_factor))
-
-
-@functools.cache
-def _operations(crs_text: str) -> TransformerGroup:
-    crs = _cached_crs(crs_text)
-    with warnings.catch_warnings():
-        # A better grid that is missing is reported by `missing_grids`.
-        warnings.simplefilter("ignore", UserWarning)
-        return TransformerGroup(crs, _WGS84, always_xy=True, allow_ballpark=False)
-
-
-@functools.cache
-def _missing_grids(crs_text: str) -> tuple[str, ...]:
-    operations = _operations(crs_text)
-    if operations.best_available:
-        return ()
-    grids = operations.unavailable_operations[0].grids
-    return tuple(sorted(grid.short_name for grid in grids if not grid.available))
-
-
-@functools.cache
-def _transformer(crs_text: str) -> pyproj.Transformer:
-    crs = _cached_crs(crs_text)
-    if not _operations(crs_text).transformers:
-        raise UnknownCrs(
-            f"coordinate system {crs_text!r} ({crs.name}) has no conversion to WGS 84 of known "
-            "accuracy, only a ballpark one; name it by its authority's code, or give its shift "
-            "(+towgs84 or a bound system), or install the shift grid its survey uses"
-        )
-    return pyproj.Transformer.from_crs(crs, _WGS84, always_xy=True, allow_ballpark=False)
+@functools.lru_cache(maxsize=64)
+def _heights(crs_text: str, area: AreaOfInterest | None) -> Heights:
+    return heights_of(parse_full_crs(crs_text), area)

@@ -8,9 +8,10 @@ and wrong matches are scattered while right ones stand together, so
 2. the seed is the match with most weight around it, under the kernel (1 - (d / reach)^2)^2;
 3. the support is every match within `REACH_M` of the seed;
 4. the place is the support's weighted geometric median, which a minority of weight cannot drag
-   (Weiszfeld's iteration as mended by Vardi & Zhang, PNAS 97(4), 2000);
-5. the radius reaches the farthest supporting camera, never less than a street is wide: the
-   photographer stood on a pavement, the survey drove on the road.
+   (Weiszfeld's iteration as mended by Vardi & Zhang, PNAS 97(4), 2000).
+
+How far from it the photographer may have stood, and whether they were there at all, is in
+`geo.confidence`.
 """
 
 from dataclasses import dataclass
@@ -18,31 +19,41 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contracts.records import Estimate
 from geo.frames import LocalMetres
 
 MOST_RANKS = 50
 """Matches ranked below this are not asked."""
 REACH_M = 25.0
 """Two matches farther apart than this do not support each other."""
-LEAST_RADIUS_M = 10.0
-LONE_RADIUS_M = REACH_M
-"""The radius when nothing but one position speaks for the place."""
 _MAX_STEPS = 200
 _STEP_TOLERANCE_M = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
-class LonLatEstimate:
-    """Where the photographer probably stood, in WGS 84; see `contracts.records.Estimate`."""
+class Consensus:
+    """Where most weight of a ranking stands together, in metres of the frame of its positions.
+
+    support : matches that agree, of which several may share one position. share : their part of
+    the weight of all placed matches, in (0, 1].
+    """
+
+    easting: float
+    northing: float
+    support: int
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class LonLatConsensus:
+    """The same in WGS 84 degrees; see `Consensus`."""
 
     lon_deg: float
     lat_deg: float
-    radius_m: float
     support: int
+    share: float
 
 
-def consensus(easting: ArrayLike, northing: ArrayLike, scores: ArrayLike) -> Estimate | None:
+def consensus(easting: ArrayLike, northing: ArrayLike, scores: ArrayLike) -> Consensus | None:
     """The robust consensus of matched camera positions, whatever their order.
 
     Parameters
@@ -54,8 +65,7 @@ def consensus(easting: ArrayLike, northing: ArrayLike, scores: ArrayLike) -> Est
 
     Returns
     -------
-    Estimate in the frame of the positions, or None when no match has a position. `support`
-    counts matches, of which several may share one position.
+    Consensus in the frame of the positions, or None when no match has a position.
 
     Raises
     ------
@@ -68,7 +78,7 @@ def consensus(easting: ArrayLike, northing: ArrayLike, scores: ArrayLike) -> Est
             f"consensus takes one finite score a position; got {xy.shape[0]} positions and "
             f"{score.size} scores, {int((~np.isfinite(score)).sum())} of them not finite"
         )
-    weights = _match_weights(score)
+    weights = match_weights(score)
     used = np.isfinite(xy).all(axis=1) & (weights > 0.0)
     if not used.any():
         return None
@@ -82,19 +92,18 @@ def consensus(easting: ArrayLike, northing: ArrayLike, scores: ArrayLike) -> Est
     # Relative to the seed, the rounding does not depend on where on Earth this is.
     offsets, pulls = xy[near] - xy[seed], weights[near]
     middle = _geometric_median(offsets, pulls)
-    spread_m = float(np.hypot(*(offsets - middle).T).max())
     place = xy[seed] + middle
-    return Estimate(
+    return Consensus(
         easting=float(place[0]),
         northing=float(place[1]),
-        radius_m=max(spread_m, LEAST_RADIUS_M if len(pulls) > 1 else LONE_RADIUS_M),
         support=len(pulls),
+        share=float(pulls.sum() / weights.sum()),
     )
 
 
 def consensus_lon_lat(
     lon_deg: ArrayLike, lat_deg: ArrayLike, scores: ArrayLike
-) -> LonLatEstimate | None:
+) -> LonLatConsensus | None:
     """`consensus` of WGS 84 positions, worked out in metres around the best placed match.
 
     Parameters
@@ -104,7 +113,7 @@ def consensus_lon_lat(
 
     Returns
     -------
-    LonLatEstimate, or None when no match has a position.
+    LonLatConsensus, or None when no match has a position.
 
     Raises
     ------
@@ -126,10 +135,10 @@ def consensus_lon_lat(
     if found is None:
         return None
     lon_found, lat_found = frame.to_lon_lat([found.easting], [found.northing])
-    return LonLatEstimate(float(lon_found[0]), float(lat_found[0]), found.radius_m, found.support)
+    return LonLatConsensus(float(lon_found[0]), float(lat_found[0]), found.support, found.share)
 
 
-def _match_weights(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+def match_weights(scores: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) weights, 0 below `MOST_RANKS`; equal scores share the better rank."""
     if scores.size == 0:
         return scores

@@ -5,18 +5,19 @@ it is ellipsoidal and known; there is no `crs` member; a match without pose has 
 """
 
 import hashlib
-import itertools
 import json
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NotRequired, TypedDict
+
+from geo.bounds import Bounds
 
 DECIMALS = 7
 _ANGLE_DECIMALS = 6
 
-Kind = Literal["match", "estimate", "error"]
+Kind = Literal["match", "estimate", "target", "error"]
 
 
 class Point(TypedDict):
@@ -48,9 +49,10 @@ class PlacedMatch:
     """One match of a query with its camera's place. None, or NaN: not known.
 
     `query` is the path as given, `image` the uri relative to its survey, `uri` one that can be
-    resolved. `heading_deg` is clockwise from true north, `pitch_deg` up positive, `roll_deg`
-    right side down positive. `choice` says how the detectors and k came to be. `height_m` is
-    ellipsoidal.
+    resolved (`survey.uris.image_uri`). `heading_deg` is clockwise from true north, `pitch_deg` up
+    positive, `roll_deg` right side down positive. `choice` says how the detectors and k came to
+    be. `height_m` is ellipsoidal. `heading_derived`: the heading is the track's direction, not
+    measured. `position_error_m` is the survey's own word on its position, horizontal.
     """
 
     query: str
@@ -72,11 +74,18 @@ class PlacedMatch:
     generation: int
     choice: str | None = None
     height_m: float | None = None
+    heading_derived: bool = False
+    position_error_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedEstimate:
-    """Where a query was probably taken; `support` matches agree within `radius_m` metres."""
+    """Where a query was probably taken; `support` matches agree within `radius_m` metres.
+
+    The truth lies inside `radius_m` with a probability of 68 %, inside `radius_95_m` of 95 %.
+    `confidence`, 0 to 1, is that the place is in the survey at all; `in_survey` is its verdict.
+    None: not known.
+    """
 
     query: str
     lon_deg: float
@@ -86,6 +95,20 @@ class PlacedEstimate:
     detectors: Sequence[str]
     k: int
     choice: str | None = None
+    radius_95_m: float | None = None
+    confidence: float | None = None
+    in_survey: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedTarget:
+    """What a query shows: the lines of sight of `support` matches meet within `radius_m` metres."""
+
+    query: str
+    lon_deg: float
+    lat_deg: float
+    radius_m: float
+    support: int
 
 
 def match_feature(match: PlacedMatch) -> Feature:
@@ -104,9 +127,11 @@ def match_feature(match: PlacedMatch) -> Feature:
         "uri": match.uri,
         "image_id": int(match.image_id),
         "heading_deg": _heading(match.heading_deg),
+        "heading_derived": match.heading_derived,
         "pitch_deg": _angle(match.pitch_deg),
         "roll_deg": _angle(match.roll_deg),
         "hfov_deg": _angle(match.hfov_deg),
+        "position_error_m": _metres(match.position_error_m),
         "captured_at": match.captured_at,
         "detectors": list(match.detectors),
         "k": int(match.k),
@@ -125,19 +150,37 @@ def estimate_feature(estimate: PlacedEstimate) -> Feature:
     ------
     ValueError : there is no position, or one outside longitude [-180, 180] or latitude [-90, 90].
     """
-    geometry = _point(estimate.lon_deg, estimate.lat_deg, None)
-    if geometry is None:
-        raise ValueError(f"the estimate of {estimate.query!r} has no position; leave it out")
     properties: dict[str, object] = {
         "kind": "estimate",
         "query": estimate.query,
         "radius_m": round(float(estimate.radius_m), 2),
+        "radius_95_m": _metres(estimate.radius_95_m),
         "support": int(estimate.support),
+        "confidence": _known(estimate.confidence),
+        "in_survey": estimate.in_survey,
         "detectors": list(estimate.detectors),
         "k": int(estimate.k),
         "choice": estimate.choice,
     }
+    geometry = _place("estimate", estimate.query, estimate.lon_deg, estimate.lat_deg)
     return _feature(estimate.query, "estimate", 0, geometry, properties)
+
+
+def target_feature(target: PlacedTarget) -> Feature:
+    """The feature of what one query shows.
+
+    Raises
+    ------
+    ValueError : there is no position, or one outside longitude [-180, 180] or latitude [-90, 90].
+    """
+    properties: dict[str, object] = {
+        "kind": "target",
+        "query": target.query,
+        "radius_m": round(float(target.radius_m), 2),
+        "support": int(target.support),
+    }
+    geometry = _place("target", target.query, target.lon_deg, target.lat_deg)
+    return _feature(target.query, "target", 0, geometry, properties)
 
 
 def error_feature(query: str, message: str) -> Feature:
@@ -151,33 +194,51 @@ def feature_collection(features: Iterable[Feature]) -> FeatureCollection:
 
     Across longitude 180 the box's west is greater than its east (RFC 7946, section 5.2).
     """
-    listed = list(features)
-    places = [
-        feature["geometry"]["coordinates"] for feature in listed if feature["geometry"] is not None
-    ]
-    if not places:
-        return {"type": "FeatureCollection", "features": listed}
-    west, east = _narrowest_span([place[0] for place in places])
-    south, north = min(place[1] for place in places), max(place[1] for place in places)
-    return {
-        "type": "FeatureCollection",
-        "bbox": [west, south, east, north],
-        "features": listed,
-    }
+    listed, bounds = list(features), Bounds()
+    for feature in listed:
+        _widen(bounds, feature)
+    collection: FeatureCollection = {"type": "FeatureCollection", "features": listed}
+    bbox = bounds.bbox()
+    return collection if bbox is None else {**collection, "bbox": bbox}
 
 
-def dumps(collection: FeatureCollection) -> str:
-    """The collection as compact JSON that can always be written as UTF-8.
+def collection_text(
+    features: Iterable[Feature], about: Mapping[str, object] | None = None
+) -> Iterator[str]:
+    """The text of a feature collection, piece by piece as features come; one a line, bbox last.
 
-    A byte of a file name that is not UTF-8 (a lone surrogate in Python) is written as its JSON
-    escape, from which Python reads the same name again.
+    It can always be written as UTF-8: a byte of a file name that is not UTF-8 (a lone surrogate
+    in Python) is written as its JSON escape, from which Python reads the same name again.
+
+    Parameters
+    ----------
+    about : where the results come from; the foreign member `flaneur` (RFC 7946, section 6.1).
 
     Raises
     ------
     ValueError : a number is NaN or infinite; RFC 8259 has no way to write it.
     """
-    text = json.dumps(collection, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    yield '{"type":"FeatureCollection",'
+    if about:
+        yield f'"flaneur":{_json(about)},'
+    yield '"features":['
+    bounds, between = Bounds(), "\n"
+    for feature in features:
+        _widen(bounds, feature)
+        yield between + _json(feature)
+        between = ",\n"
+    bbox = bounds.bbox()
+    yield "\n]" + ("" if bbox is None else f',"bbox":{_json(bbox)}') + "}\n"
+
+
+def _json(value: object) -> str:
+    text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return re.sub(r"[\ud800-\udfff]", lambda found: f"\\u{ord(found.group()):04x}", text)
+
+
+def _widen(bounds: Bounds, feature: Feature) -> None:
+    if feature["geometry"] is not None:
+        bounds.add(feature["geometry"]["coordinates"])
 
 
 def _feature(
@@ -206,9 +267,21 @@ def _point(lon_deg: float | None, lat_deg: float | None, height_m: float | None)
     return {"type": "Point", "coordinates": place if height is None else [*place, round(height, 3)]}
 
 
+def _place(kind: Kind, query: str, lon_deg: float, lat_deg: float) -> Point:
+    geometry = _point(lon_deg, lat_deg, None)
+    if geometry is None:
+        raise ValueError(f"the {kind} of {query!r} has no position; leave it out")
+    return geometry
+
+
 def _known(value: float | None) -> float | None:
     """The number, or None for the NaN by which arrays say that there is none."""
     return None if value is None or math.isnan(value) else float(value)
+
+
+def _metres(length_m: float | None) -> float | None:
+    known = _known(length_m)
+    return None if known is None else round(known, 2)
 
 
 def _angle(angle_deg: float | None) -> float | None:
@@ -220,16 +293,3 @@ def _heading(heading_deg: float | None) -> float | None:
     rounded = _angle(heading_deg)
     # Rounding can reach the whole turn.
     return None if rounded is None else rounded % 360.0
-
-
-def _narrowest_span(lons_deg: Sequence[float]) -> tuple[float, float]:
-    """West and east of the shortest arc that holds every longitude."""
-    lons = sorted(set(lons_deg))
-    outer_gap = lons[0] + 360.0 - lons[-1]
-    inner_gap, after = max(
-        ((right - left, right) for left, right in itertools.pairwise(lons)),
-        default=(0.0, lons[0]),
-    )
-    if inner_gap <= outer_gap:
-        return lons[0], lons[-1]
-    return after, lons[lons.index(after) - 1]

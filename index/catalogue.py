@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from contracts.config import North
 from contracts.errors import BadIndex
 from contracts.records import PosedImage
+from geo.crs import parse_crs
 from index.files import write_bytes
 
 
@@ -24,15 +25,18 @@ class CatalogueRow:
     image_id: int
     uri: str
     path: str
+    fragment: str
     survey: str
     sha256: str
     easting: float | None
     northing: float | None
     altitude_m: float | None
     heading_deg: float | None
+    heading_derived: bool
     north: North | None
     pitch_deg: float | None
     roll_deg: float | None
+    position_error_m: float | None
     camera: str
     hfov_deg: float | None
     width_px: int
@@ -47,8 +51,10 @@ _TYPES = {
     "northing": pa.float64(),
     "altitude_m": pa.float64(),
     "heading_deg": pa.float64(),
+    "heading_derived": pa.bool_(),
     "pitch_deg": pa.float64(),
     "roll_deg": pa.float64(),
+    "position_error_m": pa.float64(),
     "hfov_deg": pa.float64(),
     "width_px": pa.int32(),
     "height_px": pa.int32(),
@@ -66,15 +72,18 @@ def catalogue_row(
         image_id=image_id,
         uri=image.uri,
         path=image.path,
+        fragment=image.fragment,
         survey=survey,
         sha256=sha256,
         easting=pose.easting if pose else None,
         northing=pose.northing if pose else None,
         altitude_m=pose.altitude_m if pose else None,
         heading_deg=pose.heading_deg if pose else None,
+        heading_derived=pose.heading_derived if pose else False,
         north=pose.north if pose else None,
         pitch_deg=pose.pitch_deg if pose else None,
         roll_deg=pose.roll_deg if pose else None,
+        position_error_m=pose.position_error_m if pose else None,
         camera=image.camera.name,
         hfov_deg=image.camera.hfov_deg,
         width_px=width_px,
@@ -85,7 +94,10 @@ def catalogue_row(
 
 
 def write_catalogue(path: Path, rows: Sequence[CatalogueRow], crs: str | None) -> str:
-    """Write rows as GeoParquet (geometry null where there is no pose); returns the sha256."""
+    """Write rows as GeoParquet; returns the sha256.
+
+    crs : of the poses; the geometry (null where there is no pose) has its horizontal part.
+    """
     import geopandas as gpd  # slow to import, and only the writer needs it
     import numpy as np
     import shapely
@@ -98,7 +110,8 @@ def write_catalogue(path: Path, rows: Sequence[CatalogueRow], crs: str | None) -
     posed = np.isfinite(xy).all(axis=1)
     geometry = np.full(len(rows), None, dtype=object)
     geometry[posed] = shapely.points(xy[posed])
-    frame = gpd.GeoDataFrame(pa.table(table).to_pandas(), geometry=geometry, crs=crs)
+    horizontal = None if crs is None else parse_crs(crs)
+    frame = gpd.GeoDataFrame(pa.table(table).to_pandas(), geometry=geometry, crs=horizontal)
     buffer = BytesIO()
     frame.to_parquet(buffer, index=False, schema_version="1.1.0")
     return write_bytes(path, buffer.getvalue())

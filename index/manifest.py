@@ -50,6 +50,9 @@ class Generation(BaseModel):
     config: IndexConfig
     config_digest: str
     crs: str | None
+    area: tuple[float, float, float, float] | None = None
+    """West, south, east, north in WGS 84 degrees, west of 180 beyond east; None: no poses."""
+    allow_ballpark: bool = False
     n_images: int
     n_skipped: int
     n_postings: int

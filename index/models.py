@@ -1,13 +1,16 @@
-"""The adaptive choice on disk: an index's own model, or the one that Flaneur ships."""
+"""Models on disk: the adaptive choice, an index's own or the shipped one, and the placing."""
 
+import functools
 from importlib import resources
 from pathlib import Path
 
 from contracts.errors import BadIndex
+from geo.confidence import PlacingModel
 from index.files import write_bytes
 from retrieval.choice import ChoiceModel
 
 _SHIPPED = "default_choice.json"
+_SHIPPED_PLACING = "default_placing.json"
 
 
 def model_path(root: Path) -> Path:
@@ -37,3 +40,15 @@ def read_model(root: Path | None) -> ChoiceModel | None:
 
 def write_model(root: Path, model: ChoiceModel) -> None:
     write_bytes(model_path(root), model.to_json().encode())
+
+
+@functools.cache
+def placing_model() -> PlacingModel:
+    """What the certainty of estimates is worked out with: shipped, the same for every index.
+
+    Raises
+    ------
+    BadIndex : it is damaged.
+    """
+    shipped = resources.files("index") / _SHIPPED_PLACING
+    return PlacingModel.from_json(shipped.read_text(encoding="utf-8"))

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from pyproj.transformer import AreaOfInterest
 
 from contracts.config import IndexConfig
 from contracts.errors import BadConfig, BadIndex
 from contracts.records import Postings
+from geo.crs import ToWgs84
 from index.catalogue import Catalogue
 from index.codebooks import codebook_paths, read_searcher
 from index.files import map_array
@@ -47,6 +49,15 @@ class OpenedIndex:
     @property
     def n_images(self) -> int:
         return self.generation.n_images
+
+    @cached_property
+    def to_wgs84(self) -> ToWgs84 | None:
+        """How all its positions become WGS 84, by one operation; None where nothing has a pose."""
+        generation = self.generation
+        if generation.crs is None or generation.area is None:
+            return None
+        area = AreaOfInterest(*generation.area)
+        return ToWgs84(generation.crs, area, generation.allow_ballpark)
 
     @cached_property
     def catalogue(self) -> Catalogue:

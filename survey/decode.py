@@ -1,59 +1,35 @@
-"""From the bytes of a file to upright 8-bit RGB pixels, reduced while decoding.
+"""From the bytes of a file to upright 8-bit RGB pixels, reduced while decoding."""
 
-Pillow reads: unlike OpenCV it refuses a truncated JPEG instead of filling it with grey, it knows
-a size before decoding, and it reduces a JPEG in its transform domain.
-"""
-
+import functools
 import hashlib
 import io
-import os
-import stat
-import struct
-import threading
-import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import ExifTags, Image, UnidentifiedImageError
+from PIL import Image
 
 from contracts.errors import UnusableImage
-
-# Only raster formats: Pillow's others start programs (EPS), hold no photograph, or are obscure.
-_FORMATS = ("JPEG", "PNG", "TIFF", "WEBP", "BMP", "JPEG2000", "PPM")
-# What Pillow's plugins raise on damaged files; only the first is documented.
-_DAMAGED = (
-    OSError,
-    SyntaxError,
-    ValueError,
-    TypeError,
-    LookupError,
-    EOFError,
-    OverflowError,
-    struct.error,
+from survey.equirectangular import (
+    PanoramaArea,
+    panorama_width_px,
+    perspective,
+    view_side_px,
 )
+from survey.fragments import Message, View, parse_fragment
+from survey.image_file import DAMAGED, image_bytes, opened
+from survey.image_header import exif_turns, header_of
+from survey.panorama import panorama_area
+
 # Modes whose values can be averaged, unlike a palette's.
 _REDUCIBLE = {"L", "LA", "RGB", "RGBA", "CMYK", "YCbCr"}
-_PILLOW_GLOBALS = threading.Lock()
 _MASK_MAX_PIXELS = 250_000_000
 _MASKED_ABOVE = 32
 """Masks fade out over some 30 pixels: an eighth of full brightness already hides the vehicle."""
-
-# EXIF orientation -> mirror left-right first, then quarter turns counter-clockwise.
-_EXIF_TURNS = {
-    1: (False, 0),
-    2: (True, 0),
-    3: (False, 2),
-    4: (True, 2),
-    5: (True, 1),
-    6: (False, 3),
-    7: (True, 3),
-    8: (False, 1),
-}
+_REMAP_MAX_PX = 32_000
+"""cv2.remap takes sides below 2^15."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +37,8 @@ class DecodedImage:
     """An image ready for detection.
 
     rgb : (h, w, 3) uint8, upright. width_px, height_px : of the full upright image.
-    scale : pixels of the full image per pixel of `rgb`. sha256 : hex, of the file's bytes.
+    scale : pixels of the full image per pixel of `rgb`. sha256 : hex, of the bytes that were
+    decoded: of the file or message, so that all views of a panorama have that of the panorama.
     """
 
     rgb: NDArray[np.uint8]
@@ -71,24 +48,10 @@ class DecodedImage:
     sha256: str
 
 
-@dataclass(frozen=True, slots=True)
-class ImageHeader:
-    """What an image says of itself before it is decoded.
-
-    width_px, height_px : upright, after EXIF orientation. tags, details, gps : EXIF tag number
-    -> value, of the main, the Exif and the GPS directory.
-    """
-
-    width_px: int
-    height_px: int
-    tags: Mapping[int, object]
-    details: Mapping[int, object]
-    gps: Mapping[int, object]
-
-
 def decode_image(
     path: str | Path,
     *,
+    fragment: str = "",
     quarter_turns: int = 0,
     max_side_px: int = 1024,
     max_pixels: int = 250_000_000,
@@ -96,20 +59,27 @@ def decode_image(
     """Decode one image, upright and at most `max_side_px` long.
 
     16-bit samples are scaled to 8 bits; transparency is laid over white, as a viewer shows it;
-    of several frames the first counts.
+    of several frames the first counts. A view of a panorama is as fine in its middle as the
+    panorama; the panorama is decoded no finer than the view is wanted, and kept until another is
+    asked for.
 
     Parameters
     ----------
-    quarter_turns : counter-clockwise, after EXIF orientation.
+    fragment : which message or view is meant, as in `contracts.records.PosedImage`.
+    quarter_turns : counter-clockwise, after EXIF orientation; of a view's panorama, before.
     max_pixels : larger images are refused from their header, before their pixels are read.
 
     Raises
     ------
-    UnusableImage : no file or not a regular one, not an image, truncated, corrupt or too large.
+    UnusableImage : no file or not a regular one, not an image, truncated, corrupt or too large;
+        no such message; a view of what is no panorama.
     """
-    data = _read_file(path, max_pixels)
-    with _open(io.BytesIO(data)) as image:
-        mirrored, turns = _exif_turns(image)
+    part = parse_fragment(fragment)
+    if part.view is not None:
+        return _view(str(path), part.message, part.view, quarter_turns, max_side_px, max_pixels)
+    data = image_bytes(path, part.message, max_pixels)
+    with opened(io.BytesIO(data)) as image:
+        mirrored, turns = exif_turns(image)
         turns = (turns + quarter_turns) % 4
         width, height = image.size
         scale = max(1.0, max(width, height) / max_side_px)
@@ -121,12 +91,14 @@ def decode_image(
 
 
 def decode_mask(
-    path: str | Path, *, quarter_turns: int, width: int, height: int
+    path: str | Path, *, fragment: str = "", quarter_turns: int, width: int, height: int
 ) -> NDArray[np.bool_]:
     """Where an image shows usable scenery, from its mask (bright = vehicle).
 
     Parameters
     ----------
+    fragment : that of the image. A message has a mask file of its own; a view is cut from the
+        mask of its panorama, which shows the whole sphere unless its own GPano says otherwise.
     quarter_turns : counter-clockwise, those of the image the mask belongs to.
     width, height : of the decoded upright image.
 
@@ -138,101 +110,82 @@ def decode_mask(
     ------
     UnusableImage : as `decode_image`.
     """
-    data = _read_file(path, _MASK_MAX_PIXELS)
-    with _open(io.BytesIO(data)) as image:
-        mirrored, turns = _exif_turns(image)
+    view = parse_fragment(fragment).view
+    data = image_bytes(path, None, _MASK_MAX_PIXELS)
+    with opened(io.BytesIO(data)) as image:
+        mirrored, turns = exif_turns(image)
         grey = _upright(_pixels(image, image.size, "L"), mirrored, (turns + quarter_turns) % 4)
-    return np.asarray(_resized(grey, (width, height)) < _MASKED_ABOVE)
+        if view is None:
+            return np.asarray(_resized(grey, (width, height)) < _MASKED_ABOVE)
+        area = panorama_area(header_of(image)) or PanoramaArea()
+    fine = round(panorama_width_px(width, area, view.fov_deg))
+    size = (
+        min(fine, _REMAP_MAX_PX),
+        min(max(1, round(fine * len(grey) / grey.shape[1])), _REMAP_MAX_PX),
+    )
+    return np.asarray(perspective(_resized(grey, size), area, view, width) < _MASKED_ABOVE)
 
 
-def read_header(path: str | Path) -> ImageHeader:
-    """Size and EXIF of an image, without decoding it.
+@dataclass(frozen=True, slots=True)
+class _Panorama:
+    """A panorama, upright and reduced. full_width_px : before that; rgb is not to be written."""
 
-    Raises
-    ------
-    UnusableImage : no file, not a regular one, or not an image.
-    """
-    with _regular_file(path) as file, _open(file) as image:
-        _, turns = _exif_turns(image)
-        width, height = image.size if turns % 2 == 0 else image.size[::-1]
-        exif = _exif(image)
-        return ImageHeader(
-            width,
-            height,
-            tags=dict(exif),
-            details=_directory(exif, ExifTags.IFD.Exif),
-            gps=_directory(exif, ExifTags.IFD.GPSInfo),
-        )
+    rgb: NDArray[np.uint8]
+    area: PanoramaArea
+    full_width_px: int
+    sha256: str
 
 
-def _regular_file(path: str | Path) -> BinaryIO:
-    """Open for reading; a pipe or device is refused instead of waited for."""
+def _view(
+    path: str,
+    message: Message | None,
+    view: View,
+    quarter_turns: int,
+    max_side_px: int,
+    max_pixels: int,
+) -> DecodedImage:
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        found = Path(path).stat()
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise UnusableImage(f"cannot be opened: {reason}") from error
-    if not stat.S_ISREG(os.fstat(handle).st_mode):
-        os.close(handle)
-        raise UnusableImage("is not a regular file")
-    return os.fdopen(handle, "rb")
+    version = (found.st_size, found.st_mtime_ns)
+    panorama = _panorama(
+        path, version, message, quarter_turns, view.fov_deg, max_side_px, max_pixels
+    )
+    side = view_side_px(panorama.full_width_px, panorama.area, view.fov_deg)
+    scale = max(1.0, side / max_side_px)
+    rgb = perspective(panorama.rgb, panorama.area, view, max(1, round(side / scale)))
+    return DecodedImage(rgb, side, side, scale, panorama.sha256)
 
 
-def _read_file(path: str | Path, max_pixels: int) -> bytes:
-    """The file's bytes, once its header has shown an image of at most `max_pixels`."""
-    with _regular_file(path) as file:
-        with _open(file) as image:
-            width, height = image.size
-            if width * height > max_pixels:
-                raise UnusableImage(
-                    f"{width} x {height} pixels are more than max_pixels = {max_pixels}; "
-                    "reduce the image or raise max_pixels"
-                )
-        file.seek(0)
-        try:
-            return file.read()
-        except OSError as error:
-            raise UnusableImage(f"cannot be read: {error.strerror}") from error
+@functools.lru_cache(maxsize=1)
+def _panorama(
+    path: str,
+    version: tuple[int, int],
+    message: Message | None,
+    quarter_turns: int,
+    fov_deg: float,
+    max_side_px: int,
+    max_pixels: int,
+) -> _Panorama:
+    """The panorama, as fine as views of at most `max_side_px` need it; its views come in a row.
 
-
-def _open(file: BinaryIO) -> Image.Image:
-    """Read the header. Pillow's own pixel limit, a process-wide global, is lifted meanwhile."""
-    with _PILLOW_GLOBALS, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-        try:
-            return Image.open(file, formats=_FORMATS)
-        except UnidentifiedImageError as error:
-            file.seek(0)
-            what = "is not a supported image" if file.read(1) else "is empty (0 bytes)"
-            raise UnusableImage(f"{what}; expected JPEG, PNG, TIFF, WebP, BMP or PPM") from error
-        except _DAMAGED as error:
-            raise UnusableImage(f"has a damaged header: {error}") from error
-        finally:
-            Image.MAX_IMAGE_PIXELS = limit
-
-
-def _exif(image: Image.Image) -> Image.Exif:
-    with _PILLOW_GLOBALS, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            return image.getexif()
-        except _DAMAGED:
-            return Image.Exif()
-
-
-def _directory(exif: Image.Exif, number: int) -> dict[int, object]:
-    with _PILLOW_GLOBALS, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            return dict(exif.get_ifd(number))
-        except _DAMAGED:
-            return {}
-
-
-def _exif_turns(image: Image.Image) -> tuple[bool, int]:
-    orientation = _exif(image).get(ExifTags.Base.Orientation, 1)
-    return _EXIF_TURNS.get(orientation, (False, 0))
+    version : of the file, so that a changed one is read again.
+    """
+    del version
+    data = image_bytes(path, message, max_pixels)
+    with opened(io.BytesIO(data)) as image:
+        area = panorama_area(header_of(image)) or PanoramaArea()
+        mirrored, turns = exif_turns(image)
+        turns = (turns + quarter_turns) % 4
+        full = image.height if turns % 2 else image.width
+        fine = panorama_width_px(max_side_px, area, fov_deg)
+        share = min(1.0, fine / full, _REMAP_MAX_PX / max(image.size))
+        size = (max(1, round(image.width * share)), max(1, round(image.height * share)))
+        rgb = _upright(_resized(_pixels(image, size, "RGB"), size), mirrored, turns)
+    rgb.setflags(write=False)
+    return _Panorama(rgb, area, full, hashlib.sha256(data).hexdigest())
 
 
 def _pixels(image: Image.Image, size: tuple[int, int], mode: str) -> NDArray[np.uint8]:
@@ -242,7 +195,7 @@ def _pixels(image: Image.Image, size: tuple[int, int], mode: str) -> NDArray[np.
     try:
         image.load()
         return np.asarray(_eight_bits(_reduced(image, size)).convert(mode), np.uint8)
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise UnusableImage(f"is truncated or damaged: {error}") from error
 
 

@@ -1,10 +1,13 @@
-"""A folder of photographs whose EXIF says where they were taken.
+"""A folder of photographs whose EXIF and XMP say where they were taken and where they look.
 
-North: `GPSImgDirectionRef` says true or magnetic, image by image; where it is missing, true.
+North: `GPSImgDirectionRef` says true or magnetic, image by image; where it is missing, true, as in
+XMP. Heights: above the ellipsoid where all photographs say so (EXIF 3.0), else from a level that
+is not known, since most cameras write sea level of some kind and many the ellipsoid.
 """
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from numbers import Rational
 from pathlib import Path
 
@@ -13,13 +16,17 @@ from PIL import ExifTags
 from contracts.config import North
 from contracts.errors import BadSurvey, UnusableImage
 from contracts.records import Camera, Pose, PosedImage, Skipped
-from survey.decode import ImageHeader, read_header
+from survey.equirectangular import PanoramaArea
 from survey.files import list_images
+from survey.image_header import ImageHeader, read_header
 from survey.options import Reader, Reading, ReadOptions
+from survey.panorama import panorama_area
 from survey.poses import normalised, on_null_island, pose_problem
 from survey.times import zoned_time
+from survey.xmp import stated_angles
 
 CRS = "EPSG:4326"
+CRS_WITH_ELLIPSOIDAL_HEIGHT = "EPSG:4979"
 _FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
 _NO_GPS = "no GPS position in its EXIF"
 
@@ -44,12 +51,23 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     images: list[PosedImage] = []
     skipped = list(listing.skipped)
     without = 0
+    unread: list[str] = []
+    ellipsoidal: list[bool] = []
     for uri, file in listing.paths.items():
         if not wanted(uri):
             continue
-        image = _posed(uri, file, options.north)
+        try:
+            header = read_header(file)
+        except UnusableImage as error:
+            skipped.append(Skipped(uri, str(error)))
+            continue
+        if header.xmp_problem:
+            unread.append(f"{uri}: {header.xmp_problem}")
+        image = _posed(uri, file, header, options.north)
         if isinstance(image, PosedImage):
             images.append(image)
+            if image.pose is not None and image.pose.altitude_m is not None:
+                ellipsoidal.append(_above_ellipsoid(header))
         else:
             skipped.append(image)
             without += image.reason.startswith(_NO_GPS)
@@ -59,45 +77,76 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
             "table (CSV with a file column and coordinates), no GPS in EXIF. Add a pose table, "
             "or index without positions: --no-pose"
         )
-    return Reading(tuple(images), tuple(skipped), CRS)
+    crs = CRS_WITH_ELLIPSOIDAL_HEIGHT if ellipsoidal and all(ellipsoidal) else CRS
+    notes = (
+        (f"XMP of {len(unread)} images is left out; the first is {unread[0]}",) if unread else ()
+    )
+    return Reading(tuple(_in_crs(image, crs) for image in images), tuple(skipped), crs, notes)
 
 
-def _posed(uri: str, file: str, north: North | None) -> PosedImage | Skipped:
-    try:
-        header = read_header(file)
-    except UnusableImage as error:
-        return Skipped(uri, str(error))
-    pose = _pose(header.gps, north)
+def _in_crs(image: PosedImage, crs: str) -> PosedImage:
+    return image if image.pose is None else replace(image, pose=replace(image.pose, crs=crs))
+
+
+def _posed(uri: str, file: str, header: ImageHeader, north: North | None) -> PosedImage | Skipped:
+    area = _panorama_area(header)
+    pose = _pose(header, north, is_panorama=area is not None)
     if isinstance(pose, str):
         return Skipped(uri, pose)
     camera = Camera(
         name=_text(header.tags.get(ExifTags.Base.Model)),
-        hfov_deg=_hfov_deg(header),
+        hfov_deg=_hfov_deg(header) if area is None else 360.0 * area.width,
         width_px=header.width_px,
         height_px=header.height_px,
     )
-    return PosedImage(uri, file, pose, camera, _captured_at(header))
+    return PosedImage(uri, file, pose=pose, camera=camera, captured_at=_captured_at(header))
 
 
-def _pose(gps: _Tags, north: North | None) -> Pose | str:
+def _panorama_area(header: ImageHeader) -> PanoramaArea | None:
+    """Why a panorama cannot be cut is told where it is to be cut."""
+    try:
+        return panorama_area(header)
+    except UnusableImage:
+        return None
+
+
+def _pose(header: ImageHeader, north: North | None, *, is_panorama: bool) -> Pose | str:
     """The pose, or why there is none."""
+    gps = header.gps
     lon = _coordinate(gps, ExifTags.GPS.GPSLongitude, ExifTags.GPS.GPSLongitudeRef, "EW")
     lat = _coordinate(gps, ExifTags.GPS.GPSLatitude, ExifTags.GPS.GPSLatitudeRef, "NS")
     if lon is None or lat is None:
         return _NO_GPS
     if on_null_island(lon, lat):
         return f"GPS position ({lon:g}, {lat:g}) is what cameras write without a fix"
-    magnetic = _text(gps.get(ExifTags.GPS.GPSImgDirectionRef)).upper() == "M"
-    stated: North = "magnetic" if magnetic else "true"
+    angles = stated_angles(header.xmp)
+    heading, stated = _heading(gps, angles.heading_deg, xmp_first=is_panorama)
     pose = Pose(
         easting=lon,
         northing=lat,
         crs=CRS,
         altitude_m=_altitude_m(gps),
-        heading_deg=_known(gps.get(ExifTags.GPS.GPSImgDirection)),
+        heading_deg=heading,
+        pitch_deg=angles.pitch_deg,
+        roll_deg=angles.roll_deg,
         north=north or stated,
+        position_error_m=_position_error_m(gps),
     )
     return pose_problem(pose, geographic=True) or normalised(pose)
+
+
+def _heading(gps: _Tags, in_xmp: float | None, *, xmp_first: bool) -> tuple[float | None, North]:
+    """Heading and its north. EXIF says where the camera pointed, GPano the panorama's middle."""
+    direction = _known(gps.get(ExifTags.GPS.GPSImgDirection))
+    if in_xmp is not None and (xmp_first or direction is None):
+        return in_xmp, "true"
+    magnetic = _text(gps.get(ExifTags.GPS.GPSImgDirectionRef)).upper() == "M"
+    return direction, "magnetic" if magnetic else "true"
+
+
+def _position_error_m(gps: _Tags) -> float | None:
+    error = _known(gps.get(ExifTags.GPS.GPSHPositioningError))
+    return error if error is not None and error > 0.0 else None
 
 
 def _coordinate(gps: _Tags, value_tag: int, side_tag: int, sides: str) -> float | None:
@@ -113,9 +162,30 @@ def _coordinate(gps: _Tags, value_tag: int, side_tag: int, sides: str) -> float 
 
 
 def _altitude_m(gps: _Tags) -> float | None:
+    """Signed: references 1 and 3 are below their level."""
     altitude = _known(gps.get(ExifTags.GPS.GPSAltitude))
-    below = gps.get(ExifTags.GPS.GPSAltitudeRef) in (1, b"\x01")
+    below = _reference(gps) in (1, 3)
     return -altitude if altitude is not None and below else altitude
+
+
+def _reference(gps: _Tags) -> object:
+    reference = gps.get(ExifTags.GPS.GPSAltitudeRef)
+    return reference[0] if isinstance(reference, bytes) and len(reference) == 1 else reference
+
+
+def _above_ellipsoid(header: ImageHeader) -> bool:
+    """Whether the altitude counts from the ellipsoid.
+
+    EXIF 3.0 made that the meaning of references 0 and 1, which had been sea level until then,
+    and added 2 and 3 for sea level.
+    """
+    version = header.details.get(ExifTags.Base.ExifVersion)
+    return (
+        isinstance(version, bytes)
+        and version.isdigit()
+        and version >= b"0300"
+        and _reference(header.gps) in (0, 1)
+    )
 
 
 def _hfov_deg(header: ImageHeader) -> float | None:
@@ -130,20 +200,24 @@ def _hfov_deg(header: ImageHeader) -> float | None:
 
 def _captured_at(header: ImageHeader) -> str | None:
     """The camera's clock if its zone is known, else the GPS clock, which is UTC."""
-    date, _, clock = _text(header.details.get(ExifTags.Base.DateTimeOriginal)).partition(" ")
-    zone = _text(header.details.get(ExifTags.Base.OffsetTimeOriginal)) or _text(
-        header.details.get(ExifTags.Base.OffsetTime)
+    details = header.details
+    date, _, clock = _text(details.get(ExifTags.Base.DateTimeOriginal)).partition(" ")
+    fraction = _text(details.get(ExifTags.Base.SubsecTimeOriginal))
+    if fraction.isdecimal():
+        clock += f".{fraction[:6]:0<6}"
+    zone = _text(details.get(ExifTags.Base.OffsetTimeOriginal)) or _text(
+        details.get(ExifTags.Base.OffsetTime)
     )
     if zone and (moment := zoned_time(f"{date.replace(':', '-')}T{clock}{zone}")):
         return moment
     day = _text(header.gps.get(ExifTags.GPS.GPSDateStamp)).replace(":", "-")
     stamp = header.gps.get(ExifTags.GPS.GPSTimeStamp)
     parts = [_known(part) for part in stamp] if isinstance(stamp, tuple) else []
-    known = [int(part) for part in parts if part is not None]
+    known = [part for part in parts if part is not None]
     if len(known) != 3:
         return None
-    hour, minute, second = known
-    return zoned_time(f"{day}T{hour:02d}:{minute:02d}:{second:02d}Z")
+    hour, minute, second = int(known[0]), int(known[1]), int(known[2] * 1000.0) / 1000.0
+    return zoned_time(f"{day}T{hour:02d}:{minute:02d}:{second:06.3f}Z")
 
 
 def _number(value: object) -> float | None:

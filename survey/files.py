@@ -10,7 +10,20 @@ from contracts.errors import BadSurvey
 from contracts.records import Skipped
 
 IMAGE_SUFFIXES = frozenset(
-    {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".bmp", ".jp2", ".ppm", ".pgm"}
+    {
+        ".jpg",
+        ".jpeg",
+        ".png",
+        ".tif",
+        ".tiff",
+        ".webp",
+        ".heic",
+        ".heif",
+        ".bmp",
+        ".jp2",
+        ".ppm",
+        ".pgm",
+    }
 )
 
 
@@ -68,6 +81,11 @@ def list_images(root: Path) -> Listing:
     return Listing(found, tuple(skipped))
 
 
+def is_image_name(name: str) -> bool:
+    """Whether a name ends like an image's."""
+    return os.path.splitext(name)[1].lower() in IMAGE_SUFFIXES  # noqa: PTH122
+
+
 def printable_uri(text: str) -> str:
     """NFC, with bytes that are not UTF-8 shown as U+FFFD so that the uri can be written."""
     return unicodedata.normalize("NFC", os.fsencode(text).decode("utf-8", "replace"))
@@ -75,7 +93,7 @@ def printable_uri(text: str) -> str:
 
 def _unusable(entry: os.DirEntry[str], real_root: str) -> str | None:
     """Why an entry is left out; "" if it is a good file, None if it is of no interest."""
-    is_image = os.path.splitext(entry.name)[1].lower() in IMAGE_SUFFIXES  # noqa: PTH122
+    is_image = is_image_name(entry.name)
     linked = entry.is_symlink()
     # `os.path.isdir` answers False to a link that leads to itself; the entry's own raises.
     if not is_image and not (linked and os.path.isdir(entry.path)):  # noqa: PTH112

@@ -22,6 +22,11 @@ class ReadOptions:
     include, exclude : globs on uris (`NAME/` included), see `selector`.
     format : a reader's name; None: recognised by content.
     make_upright, use_masks : whether rotated storage is put upright, vehicle masks applied.
+    mapping : a TOML file that says what the columns of a table are (docs/surveys.md).
+    max_gap_s : poses farther apart than this in time are not interpolated between.
+    cut_panoramas : equirectangular panoramas become perspective views; False: used as they are.
+    derive_headings : images of a sequence without headings get their track's direction.
+    allow_ballpark : accept a conversion to WGS 84 whose accuracy nobody knows.
     name : prefix `NAME/` of the uris of a further survey.
     """
 
@@ -33,6 +38,11 @@ class ReadOptions:
     format: str | None = None
     make_upright: bool = True
     use_masks: bool = True
+    mapping: Path | None = None
+    max_gap_s: float = 1.0
+    cut_panoramas: bool = True
+    derive_headings: bool = True
+    allow_ballpark: bool = False
     name: str = ""
 
     def uri(self, local_uri: str) -> str:
@@ -45,7 +55,8 @@ class Survey:
     """A survey as read: its images in the order of the bytes of their uris.
 
     crs : of every pose; None with `no_pose`. format : the reader's name. attribution : what the
-    data itself asks to be shown beside results, or "".
+    data itself asks to be shown beside results, or "". notes : what a person should know of how
+    it was read.
     """
 
     images: tuple[PosedImage, ...]
@@ -53,15 +64,21 @@ class Survey:
     crs: str | None
     format: str
     attribution: str = ""
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What one reader found, with uris local to the survey, in any order."""
+    """What one reader found, with uris local to the survey, in any order.
+
+    crs : of every pose; compound or three-dimensional where the format says from what heights
+    count. notes : what a person should know of how it was read, such as derived headings.
+    """
 
     images: tuple[PosedImage, ...]
     skipped: tuple[Skipped, ...]
     crs: str | None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

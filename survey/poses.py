@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import pyproj
 from numpy.typing import NDArray
 
 from contracts.records import Pose
-from geo.attitude import wrapped_180
-from geo.crs import parse_crs
-from geo.headings import wrapped_360
+from geo.crs import grid_of, parse_crs, parse_full_crs
+from geo.headings import wrapped_180, wrapped_360
 
 _LOWEST_M, _HIGHEST_M = -1_000.0, 10_000.0
 _AREA_MARGIN_DEG = 2.0
@@ -21,11 +19,13 @@ _NULL_ISLAND_DEG = 1e-4
 def crs_name(text: str) -> str:
     """The short name under which poses carry a coordinate system, such as `EPSG:2154`.
 
+    Heights stay part of it: `EPSG:2154+5720` is `EPSG:5698`.
+
     Raises
     ------
-    UnknownCrs : see `geo.crs.parse_crs`.
+    UnknownCrs : see `geo.crs.parse_full_crs`.
     """
-    crs = parse_crs(text)
+    crs = parse_full_crs(text)
     authority = crs.to_authority(min_confidence=100)
     return ":".join(authority) if authority else crs.to_string()
 
@@ -83,18 +83,15 @@ def outside_area(poses: Sequence[Pose], crs: str) -> NDArray[np.bool_]:
     Swapped axes and a wrong `--crs` show here. A system that states no area accepts all that it
     can convert.
     """
-    parsed = parse_crs(crs)
-    x = np.array([pose.easting for pose in poses], np.float64)
-    y = np.array([pose.northing for pose in poses], np.float64)
-    lon, lat = x, y
-    if not parsed.is_geographic:
-        # The datum matters less than 200 m here: the plain inverse projection will do.
-        base = parsed.geodetic_crs
-        lon, lat = pyproj.Transformer.from_crs(parsed, base, always_xy=True).transform(x, y)
-        lon, lat = np.asarray(lon, np.float64), np.asarray(lat, np.float64)
+    grid = grid_of(crs)
+    lon, lat = grid.degrees(
+        np.array([pose.easting for pose in poses], np.float64),
+        np.array([pose.northing for pose in poses], np.float64),
+    )
+    lon = lon + grid.prime_meridian_deg  # the datum matters less than 200 m here
     # An inverse projection may well answer with a place it would itself put elsewhere.
     finite = np.isfinite(lon) & np.isfinite(lat)
-    area = parsed.area_of_use
+    area = parse_crs(crs).area_of_use
     if area is None:
         return np.asarray(~finite)
     width = (area.east - area.west) % 360.0 or 360.0

@@ -3,12 +3,15 @@
 from pathlib import Path
 
 from contracts.errors import BadConfig, BadSurvey
-from survey import exif, plain, stereopolis, table
+from survey import exif, kapture, mcap, plain, stereopolis, tables, utm_names
 from survey.options import Reader, ReadOptions
 
 READERS: tuple[Reader, ...] = (
     stereopolis.READER,
-    table.READER,
+    mcap.READER,
+    kapture.READER,
+    tables.READER,
+    utm_names.READER,
     exif.READER,
     plain.READER,
 )

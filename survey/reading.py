@@ -11,8 +11,10 @@ from contracts.errors import BadSurvey
 from contracts.records import Pose, PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.options import Reading, ReadOptions, Survey, selector
+from survey.panorama import cut_panoramas
 from survey.poses import crs_name, outside_area
 from survey.readers import choose_reader
+from survey.track import with_track_headings
 
 
 def read_survey(path: Path, options: ReadOptions) -> Survey:
@@ -43,8 +45,13 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
         reading = replace(reading, images=bare, crs=None)
     reading = _only(reading, wanted)
     if reading.crs is not None:
-        ToWgs84(reading.crs)  # refused now, not when the first photo is to be placed
         reading = _inside_area(reading, path)
+        _refuse_unconvertible(reading, options)
+        if options.derive_headings:
+            reading = _with_headings(reading)
+    if options.cut_panoramas:
+        images, uncut = cut_panoramas(reading.images)
+        reading = replace(reading, images=images, skipped=reading.skipped + uncut)
     if not reading.images:
         raise BadSurvey(_why_empty(path, reading.skipped, options))
     return Survey(
@@ -52,7 +59,31 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
         skipped=_ordered(reading.skipped, options),
         crs=reading.crs,
         format=reader.name,
+        notes=reading.notes,
     )
+
+
+def _refuse_unconvertible(reading: Reading, options: ReadOptions) -> None:
+    """A conversion that is missing is refused now, not when the first photo is to be placed."""
+    poses = [pose for image in reading.images if (pose := image.pose) is not None]
+    if reading.crs is not None and poses:
+        x, y = [pose.easting for pose in poses], [pose.northing for pose in poses]
+        ToWgs84.over(reading.crs, x, y, options.allow_ballpark)
+
+
+def _with_headings(reading: Reading) -> Reading:
+    """Images without heading get their track's direction, and a note says how many."""
+    if reading.crs is None:
+        return reading
+    images = with_track_headings(reading.images, reading.crs)
+    n_derived = sum(image.pose is not None and image.pose.heading_derived for image in images)
+    if n_derived == 0:
+        return reading
+    note = (
+        f"{n_derived} of {len(images)} images have no heading: they get their track's direction, "
+        "as if the camera looked forward (--no-track-headings leaves them without)"
+    )
+    return replace(reading, images=images, notes=(*reading.notes, note))
 
 
 def _only(reading: Reading, wanted: Callable[[str], bool]) -> Reading:

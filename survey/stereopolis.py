@@ -10,10 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from contracts.config import North
 from contracts.errors import BadSurvey
 from contracts.records import Camera, Pose, PosedImage, Skipped
 from geo.attitude import Attitude, camera_attitude, enu_from_frd
+from geo.crs import grid_of
 from survey.files import Listing, list_images, printable_uri
 from survey.options import Reader, Reading, ReadOptions
 from survey.poses import pose_problem
@@ -117,15 +120,16 @@ def _posed(uri: str, shot: _Shot, listing: Listing, options: ReadOptions) -> Pos
     """One image with its camera's pose, or why that pose cannot be."""
     camera, panorama = shot.camera, shot.panorama
     enu_from_vehicle = enu_from_frd(panorama.attitude)
-    east, north, up = enu_from_vehicle @ camera.lever_arm_m
+    east, north, up = np.split(enu_from_vehicle @ camera.lever_arm_m, 3)
+    x, y = np.array([panorama.easting]), np.array([panorama.northing])
+    # The vehicle is turned from true north and placed on grid north.
+    easting, northing = grid_of(CRS).moved(x, y, east, north)
     attitude = camera_attitude(enu_from_vehicle @ camera.frd_from_camera)
     pose = Pose(
-        # The vehicle is turned from true north and placed on grid north: half a degree over
-        # a lever arm of 30 cm is 3 mm.
-        easting=panorama.easting + float(east),
-        northing=panorama.northing + float(north),
+        easting=float(easting[0]),
+        northing=float(northing[0]),
         crs=CRS,
-        altitude_m=panorama.altitude_m + float(up),
+        altitude_m=panorama.altitude_m + float(up[0]),
         heading_deg=attitude.heading_deg,
         pitch_deg=attitude.pitch_deg,
         roll_deg=attitude.roll_deg,

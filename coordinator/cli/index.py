@@ -14,7 +14,6 @@ from contracts.config import (
     CodebookConfig,
     FeatureConfig,
     IndexConfig,
-    North,
 )
 from contracts.errors import BadConfig
 from coordinator.cli.lists import (
@@ -26,31 +25,42 @@ from coordinator.cli.lists import (
     names_among,
 )
 from coordinator.cli.show import bars, complain, list_skipped, tell
+from coordinator.cli.survey_options import (
+    AllowBallpark,
+    Crs,
+    Exclude,
+    Format,
+    Include,
+    Mapping,
+    MaxGap,
+    NoPose,
+    North,
+    NoTrackHeadings,
+    SurveyPath,
+    WholePanoramas,
+)
 
 NAME = "index"
 
 
 def command(
-    survey: Annotated[Path, typer.Argument(help="A folder, or a pose table.")],
+    survey: SurveyPath,
     index: Annotated[Path, typer.Argument(help="Where the index goes.")],
     also: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=SURVEY", help="Another survey; its uris begin with NAME/."),
     ] = None,
-    include: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Only uris like this.")
-    ] = None,
-    exclude: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="No uris like this.")
-    ] = None,
-    crs: Annotated[str | None, typer.Option(help="CRS of a pose table, such as EPSG:2154.")] = None,
-    north: Annotated[
-        North | None, typer.Option(help="What headings are measured from: grid, true or magnetic.")
-    ] = None,
-    no_pose: Annotated[bool, typer.Option("--no-pose", help="Index images without poses.")] = False,
-    survey_format: Annotated[
-        str | None, typer.Option("--format", help="stereopolis, table, exif or plain.")
-    ] = None,
+    include: Include = None,
+    exclude: Exclude = None,
+    crs: Crs = None,
+    north: North = None,
+    no_pose: NoPose = False,
+    survey_format: Format = None,
+    mapping: Mapping = None,
+    max_gap: MaxGap = 1.0,
+    whole_panoramas: WholePanoramas = False,
+    no_track_headings: NoTrackHeadings = False,
+    allow_ballpark: AllowBallpark = False,
     detectors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DETECTORS),
     descriptors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DESCRIPTORS),
     max_frames: MaxFrames = None,
@@ -93,11 +103,18 @@ def command(
         format=survey_format,
         make_upright=not stored_rotation,
         use_masks=not no_masks,
+        mapping=mapping,
+        max_gap_s=max_gap,
+        cut_panoramas=not whole_panoramas,
+        derive_headings=not no_track_headings,
+        allow_ballpark=allow_ballpark,
     )
     started = time.perf_counter()
     root = index.absolute()
     intake = read_surveys([("", survey.absolute()), *map(_named, also or ())], options)
     job, plan = make_plan(root, intake, config, shard_size or DEFAULT_SHARD_SIZE)
+    for note in intake.notes:
+        tell(note)
     tell(f"{len(intake.images)} images in {plan.n_shards} shards; job {plan.job}")
     with bars() as progress:
         report = run_job(job, plan, intake, running_engine(broker, workers), progress)

@@ -1,7 +1,8 @@
-"""`flaneur locate`: photos become GeoJSON."""
+"""`flaneur locate`: photos become places, as GeoJSON and in other formats."""
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,13 +22,23 @@ from coordinator.cli.lists import (
 from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
 
+if TYPE_CHECKING:
+    from coordinator.querying import Located
+
 NAME = "locate"
 
 
 def command(
     photos: Annotated[list[str], typer.Argument(metavar="PHOTO...", help="Photos to locate.")],
     index: IndexFolder,
-    out: Annotated[Path | None, typer.Option(help="GeoJSON file; default: stdout.")] = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Results, in the format that the name ends in: .geojson, .gpkg, .fgb, .parquet "
+            "or .kml; may be given several times. Default: GeoJSON on stdout.",
+        ),
+    ] = None,
     top: Annotated[int, typer.Option(help="Matches a photo.")] = 10,
     pair: Pair = "auto",
     k: K = "auto",
@@ -39,36 +50,57 @@ def command(
 ) -> int:
     """Find where photos were taken."""
     from coordinator.engine import running_engine
-    from coordinator.export.files import write_geojson
+    from coordinator.export.geojson import encoded, provenance
+    from coordinator.export.results import features_of, refuse_unknown, write_results
     from coordinator.querying import locate_photos
-    from geo.geojson import dumps, feature_collection
     from index.opened import OpenedIndex
 
     search = search_config(pair, k, vote, weights, descriptors, top)
     opened = OpenedIndex(index.absolute())
     search = fitted_search(search, vote, opened.config.features)
     photos = list(dict.fromkeys(photos))  # globs overlap; a feature's id is of its photo's name
-    out = None if out is None else result_file(out, map(Path, photos))
+    outs = [result_file(each, map(Path, photos)) for each in out or ()]
+    refuse_unknown(outs)
+    about = provenance(opened)
+    tally = _Tally()
     count = min(workers or len(photos), len(photos)) if broker is None else None
     with running_engine(broker, _at_most_cores(count), ("locate",)) as engine, bars() as progress:
         progress.begin("locate", len(photos), 0)
-        located = locate_photos(
-            opened, photos, search, engine.follower, lambda: progress.advance("locate")
+        answers = tally.count(
+            locate_photos(
+                opened, photos, search, engine.follower, lambda: progress.advance("locate")
+            )
         )
-    features = [feature for answer in located for feature in answer.features]
-    collection = feature_collection(features)
-    if out is None:
-        typer.echo(dumps(collection).encode())  # UTF-8 in every locale
-    else:
-        write_geojson(out, collection)
-    failed = [answer for answer in located if answer.error is not None]
-    for answer in failed:
-        complain(f"{answer.query}: {answer.error}")
-    for choice in sorted({each for answer in located for each in answer.not_chosen}):
+        if outs:
+            write_results(outs, answers, opened, about, tell)
+        else:
+            for piece in encoded(features_of(answers), about):
+                typer.echo(piece, nl=False)  # UTF-8 in every locale
+    for query, error in tally.failed:
+        complain(f"{query}: {error}")
+    for choice in sorted(tally.not_chosen):
         tell(f"Detectors and k by {choice}")
-    if out is not None:
-        tell(f"{len(located) - len(failed)} of {len(located)} photos located: {out}")
-    return SOME_SKIPPED if failed else 0
+    if outs:
+        located = tally.n_answers - len(tally.failed)
+        tell(f"{located} of {tally.n_answers} photos located: {', '.join(map(str, outs))}")
+    return SOME_SKIPPED if tally.failed else 0
+
+
+class _Tally:
+    """What a person is told at the end, noted as the answers go by."""
+
+    def __init__(self) -> None:
+        self.n_answers = 0
+        self.failed: list[tuple[str, str]] = []
+        self.not_chosen: set[str] = set()
+
+    def count(self, answers: "Iterable[Located]") -> "Iterator[Located]":
+        for answer in answers:
+            self.n_answers += 1
+            self.not_chosen |= answer.not_chosen
+            if answer.error is not None:
+                self.failed.append((answer.query, answer.error))
+            yield answer
 
 
 def _at_most_cores(count: int | None) -> int | None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from contracts.errors import FlaneurError, WrongInput
-from coordinator.cli import demo, evaluate, index, inspect, locate, train, worker
+from coordinator.cli import demo, evaluate, export, index, inspect, locate, train, worker
 from coordinator.cli.show import complain
 
 FAILED, WRONG_USAGE = 1, 2
@@ -60,6 +60,10 @@ main = typer.Typer(
 )
 for verb in (demo, index, locate, inspect, train, evaluate, worker):
     main.command(verb.NAME)(_guarded(verb.command))
+exports = typer.Typer(no_args_is_help=True, help=export.HELP)
+for name, command in export.COMMANDS.items():
+    exports.command(name)(_guarded(command))
+main.add_typer(exports, name=export.NAME)
 
 
 @main.callback()

@@ -1,21 +1,10 @@
 """Result files, written whole or not at all."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from contracts.errors import WrongInput
-from geo.geojson import FeatureCollection, dumps
-from index.files import write_bytes
-
-
-def write_geojson(out: Path, collection: FeatureCollection) -> None:
-    """Write the collection as UTF-8 GeoJSON.
-
-    Raises
-    ------
-    WrongInput : `out` cannot be written.
-    ValueError : a number is not finite.
-    """
-    write_whole(out, (dumps(collection) + "\n").encode())
+from index.files import write_atomic
 
 
 def write_whole(out: Path, content: bytes) -> None:
@@ -25,8 +14,20 @@ def write_whole(out: Path, content: bytes) -> None:
     ------
     WrongInput : `out` cannot be written.
     """
+    write_pieces(out, [content])
+
+
+def write_pieces(out: Path, pieces: Iterable[bytes]) -> None:
+    """Like `write_whole`, of content that is never in memory at once.
+
+    Whatever `pieces` raises ends it: the old file stays, or none.
+
+    Raises
+    ------
+    WrongInput : `out` cannot be written.
+    """
     try:
-        write_bytes(out, content)
+        write_atomic(out, lambda stream: stream.writelines(pieces))
     except OSError as error:
         raise WrongInput(
             f"cannot write {out}: {error.strerror}; name a file (not a folder) where there is "

@@ -51,6 +51,8 @@ class QuerySheet:
 def thumbnail_jpeg(
     path: str | Path,
     side_px: int,
+    *,
+    fragment: str = "",
     quarter_turns: int = 0,
     box: tuple[float, float, float, float] | None = None,
     max_bytes: int = 15_000,
@@ -59,6 +61,7 @@ def thumbnail_jpeg(
 
     Parameters
     ----------
+    fragment : what within the file is the image; "" = all of it.
     quarter_turns : counter-clockwise, after EXIF orientation.
     box : x1 y1 x2 y2, pixels of the upright original; outlined.
     max_bytes : the quality is lowered until it is met, or no lower is worth a look.
@@ -67,7 +70,9 @@ def thumbnail_jpeg(
     ------
     UnusableImage : it is gone or cannot be read.
     """
-    decoded = decode_image(path, quarter_turns=quarter_turns, max_side_px=side_px)
+    decoded = decode_image(
+        path, fragment=fragment, quarter_turns=quarter_turns, max_side_px=side_px
+    )
     rgb = decoded.rgb.copy()
     if box is not None:
         # OpenCV's integers have 32 bits, and a truth may hold any number.

@@ -1,20 +1,22 @@
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from contracts.errors import WrongInput
-from coordinator.export.files import write_geojson, write_whole
+from coordinator.export.files import write_pieces, write_whole
+from coordinator.export.geojson import write_geojson
 from geo.geojson import error_feature, feature_collection
 
 
 def test_a_result_replaces_the_old_file_and_leaves_nothing_beside(tmp_path: Path) -> None:
     out = tmp_path / "results.geojson"
     out.write_text("old", "utf-8")
-    collection = feature_collection([error_feature("é.jpg", "why")])
-    write_geojson(out, collection)
-    assert json.loads(out.read_text("utf-8")) == collection
+    features = [error_feature("é.jpg", "why")]
+    write_geojson(out, features)
+    assert json.loads(out.read_text("utf-8")) == feature_collection(features)
     assert list(tmp_path.iterdir()) == [out]
 
 
@@ -24,8 +26,19 @@ def test_what_cannot_be_serialised_leaves_the_old_file(tmp_path: Path) -> None:
     broken = error_feature("a.jpg", "why")
     broken["properties"]["score"] = math.nan
     with pytest.raises(ValueError, match="JSON"):
-        write_geojson(out, feature_collection([broken]))
+        write_geojson(out, [error_feature("b.jpg", "why"), broken])
     assert out.read_text("utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_pieces_that_end_early_leave_nothing(tmp_path: Path) -> None:
+    def pieces() -> Iterator[bytes]:
+        yield b"half"
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_pieces(tmp_path / "out", pieces())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_where_nothing_can_be_written_the_error_names_the_file(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geo.crs import ToWgs84
-from geo.estimate import LEAST_RADIUS_M, LONE_RADIUS_M, REACH_M, consensus, consensus_lon_lat
+from geo.estimate import REACH_M, consensus, consensus_lon_lat
 
 Ranking = list[tuple[tuple[int, int], int]]
 
@@ -43,19 +43,18 @@ def test_moving_every_camera_moves_the_estimate(ranking: Ranking, east: int, nor
     assert there is not None
     assert there.easting - east == pytest.approx(here.easting, abs=1e-6)
     assert there.northing - north == pytest.approx(here.northing, abs=1e-6)
-    assert there.radius_m == pytest.approx(here.radius_m, abs=1e-6)
-    assert there.support == here.support
+    assert (there.support, there.share) == (here.support, here.share)
 
 
 @given(rankings)
 @settings(max_examples=60, deadline=None)
-def test_the_supporting_cameras_lie_within_the_radius(ranking: Ranking) -> None:
+def test_the_supporting_cameras_lie_within_reach_of_one_of_them(ranking: Ranking) -> None:
     x, y, score = columns(ranking)
     found = consensus(x, y, score)
     assert found is not None
     apart = np.hypot(np.array(x) - found.easting, np.array(y) - found.northing)
-    assert (apart <= found.radius_m + 1e-6).sum() >= found.support >= 1
-    assert found.radius_m <= 2 * REACH_M
+    assert (apart <= 2 * REACH_M).sum() >= found.support >= 1
+    assert 0.0 < found.share <= 1.0
 
 
 def test_scattered_wrong_matches_do_not_move_the_place() -> None:
@@ -67,13 +66,15 @@ def test_scattered_wrong_matches_do_not_move_the_place() -> None:
     assert found is not None
     assert math.hypot(found.easting, found.northing) < 4.0
     assert found.support == 4
-    assert found.radius_m == LEAST_RADIUS_M
+    weights = scores / np.arange(1, 9)
+    assert found.share == pytest.approx(weights[:4].sum() / weights.sum())
 
 
 def test_the_best_match_stands_against_two_that_agree_below_it() -> None:
     found = consensus([0.0, 500.0, 500.0], [0.0] * 3, [1.0, 0.9, 0.9])
     assert found is not None
-    assert (found.easting, found.support, found.radius_m) == (0.0, 1, LONE_RADIUS_M)
+    assert (found.easting, found.support) == (0.0, 1)
+    assert found.share == pytest.approx(1.0 / (1.0 + 0.9 / 2 + 0.9 / 2))
 
 
 def test_many_agreeing_matches_overrule_a_lone_best_one() -> None:
@@ -140,7 +141,7 @@ def test_in_lon_lat_the_place_is_the_same_as_in_a_metric_grid() -> None:
     assert in_degrees is not None
     east, north = ToWgs84("EPSG:2154").from_lon_lat([in_degrees.lon_deg], [in_degrees.lat_deg])
     assert (east[0], north[0]) == pytest.approx((in_grid.easting, in_grid.northing), abs=0.01)
-    assert in_degrees.radius_m == pytest.approx(in_grid.radius_m, abs=0.01)
+    assert in_degrees.share == pytest.approx(in_grid.share)
     assert in_degrees.support == in_grid.support == 3
 
 

@@ -1,84 +1,26 @@
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import geojson_pydantic
-import pydantic
-import pyogrio
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from made_features import ESTIMATE, MATCH, TARGET, features, text
 
 from geo.geojson import (
-    PlacedEstimate,
+    Feature,
     PlacedMatch,
-    dumps,
+    collection_text,
     error_feature,
     estimate_feature,
     feature_collection,
     match_feature,
-)
-
-MATCH = PlacedMatch(
-    query="cartes/été 1910.jpg",
-    rank=1,
-    score=0.75,
-    image="run1/a.jpg",
-    uri="file:///survey/run1/a.jpg",
-    image_id=7,
-    lon_deg=2.33655573123,
-    lat_deg=44.99997468456,
-    heading_deg=359.99999999,
-    pitch_deg=-1.5,
-    roll_deg=0.25,
-    hfov_deg=None,
-    captured_at="2014-06-16T10:00:00+02:00",
-    detectors=("hesaff", "star"),
-    k=2,
-    predicted_map=math.nan,
-    generation=3,
-)
-ESTIMATE = PlacedEstimate(
-    "cartes/été 1910.jpg", 2.3365, 45.0, 12.3456, 4, ("hesaff", "star"), 2, "default: no model"
+    target_feature,
 )
 
 
 def placed(lon: float, lat: float = 0.0) -> PlacedMatch:
     return replace(MATCH, lon_deg=lon, lat_deg=lat)
-
-
-def everything() -> str:
-    features = [
-        match_feature(MATCH),
-        match_feature(replace(MATCH, rank=2, lon_deg=None, lat_deg=math.nan)),
-        estimate_feature(ESTIMATE),
-        error_feature("broken.jpg", "no image data"),
-    ]
-    return dumps(feature_collection(features))
-
-
-def test_an_independent_model_of_rfc_7946_accepts_the_collection() -> None:
-    geojson_pydantic.FeatureCollection.model_validate_json(everything())
-    assert json.loads(everything())["bbox"] == [2.3365, 44.9999747, 2.3365557, 45.0]
-    assert "crs" not in json.loads(everything())
-
-
-def test_that_model_refuses_what_is_wrong() -> None:
-    wrong = everything().replace('"Point"', '"Pint"', 1)
-    with pytest.raises(pydantic.ValidationError):
-        geojson_pydantic.FeatureCollection.model_validate_json(wrong)
-
-
-def test_gdal_reads_the_collection_in_wgs_84(tmp_path: Path) -> None:
-    path = tmp_path / "results.geojson"
-    path.write_text(everything(), "utf-8")
-    frame = pyogrio.read_dataframe(path)
-    assert frame.crs.to_epsg() == 4326
-    assert list(frame["kind"]) == ["match", "match", "estimate", "error"]
-    assert frame.geometry.isna().tolist() == [False, True, False, True]
-    assert frame.geometry[0].x == pytest.approx(2.3365557, abs=1e-12)
-    assert frame["query"][0] == "cartes/été 1910.jpg"
 
 
 def test_a_match_has_the_fields_of_the_design() -> None:
@@ -93,9 +35,11 @@ def test_a_match_has_the_fields_of_the_design() -> None:
         "uri": "file:///survey/run1/a.jpg",
         "image_id": 7,
         "heading_deg": 0.0,
+        "heading_derived": False,
         "pitch_deg": -1.5,
         "roll_deg": 0.25,
         "hfov_deg": None,
+        "position_error_m": None,
         "captured_at": "2014-06-16T10:00:00+02:00",
         "detectors": ["hesaff", "star"],
         "k": 2,
@@ -105,16 +49,52 @@ def test_a_match_has_the_fields_of_the_design() -> None:
     }
 
 
+def test_what_is_known_of_a_pose_is_told() -> None:
+    match = replace(MATCH, heading_derived=True, position_error_m=1.23456)
+    properties = match_feature(match)["properties"]
+    assert properties["heading_derived"] is True
+    assert properties["position_error_m"] == 1.23
+
+
 def test_an_estimate_has_the_fields_of_the_design() -> None:
     assert estimate_feature(ESTIMATE)["properties"] == {
         "kind": "estimate",
         "query": "cartes/été 1910.jpg",
         "radius_m": 12.35,
+        "radius_95_m": None,
         "support": 4,
+        "confidence": None,
+        "in_survey": None,
         "detectors": ["hesaff", "star"],
         "k": 2,
         "choice": "default: no model",
     }
+    sure = replace(ESTIMATE, radius_95_m=40.123, confidence=0.875, in_survey=True)
+    properties = estimate_feature(sure)["properties"]
+    assert [properties[each] for each in ("radius_95_m", "confidence", "in_survey")] == [
+        40.12,
+        0.875,
+        True,
+    ]
+
+
+def test_a_target_is_a_point_with_its_support() -> None:
+    feature = target_feature(TARGET)
+    assert feature["geometry"] == {"type": "Point", "coordinates": [2.3364, 45.0001]}
+    assert feature["properties"] == {
+        "kind": "target",
+        "query": "cartes/été 1910.jpg",
+        "radius_m": 3.46,
+        "support": 3,
+    }
+
+
+@pytest.mark.parametrize("nowhere", [math.nan, None])
+def test_an_estimate_or_a_target_nowhere_is_refused(nowhere: float) -> None:
+    with pytest.raises(ValueError, match="estimate of 'cartes"):
+        estimate_feature(replace(ESTIMATE, lon_deg=nowhere))
+    with pytest.raises(ValueError, match="target of 'cartes"):
+        target_feature(replace(TARGET, lat_deg=nowhere))
 
 
 def test_an_error_has_no_place_and_says_why() -> None:
@@ -124,14 +104,15 @@ def test_an_error_has_no_place_and_says_why() -> None:
 
 
 def test_ids_differ_by_query_kind_and_rank_and_by_nothing_else() -> None:
-    features = [
+    told = [
         match_feature(MATCH),
         match_feature(replace(MATCH, rank=2)),
         match_feature(replace(MATCH, query="b.jpg")),
         estimate_feature(ESTIMATE),
+        target_feature(TARGET),
         error_feature(MATCH.query, "why"),
     ]
-    ids = [feature["id"] for feature in features]
+    ids = [feature["id"] for feature in told]
     assert len(set(ids)) == len(ids)
     assert all(int(identity, 16) >= 0 for identity in ids)
     assert match_feature(replace(MATCH, score=0.1, image="c.jpg"))["id"] == ids[0]
@@ -143,31 +124,21 @@ def test_an_ellipsoidal_height_is_the_third_coordinate() -> None:
     assert geometry["coordinates"][2] == 80.123
 
 
-@pytest.mark.parametrize(
-    ("lons", "west", "east"),
-    [
-        ([2.0, 3.0], 2.0, 3.0),
-        ([5.0], 5.0, 5.0),
-        ([179.0, -179.0], 179.0, -179.0),
-        ([170.0, -160.0, 175.0], 170.0, -160.0),
-        ([-74.0, 2.0, 139.0], -74.0, 139.0),
-        ([-90.0, 90.0], -90.0, 90.0),
-    ],
-)
-def test_the_box_takes_the_short_way_round(lons: list[float], west: float, east: float) -> None:
-    features = [match_feature(placed(lon, lat)) for lat, lon in enumerate(lons)]
-    assert feature_collection(features)["bbox"] == [west, 0.0, east, float(len(lons) - 1)]
+def test_heights_make_the_box_three_dimensional() -> None:
+    """Section 5: a box has as many dimensions as the geometries in it."""
+    low, high = replace(MATCH, height_m=80.0), replace(MATCH, rank=2, height_m=90.5)
+    flat = replace(MATCH, rank=3, lon_deg=2.5)
+    told = [match_feature(each) for each in (high, flat, low)]
+    bbox = [2.3365557, 44.9999747, 80.0, 2.5, 44.9999747, 90.5]
+    assert feature_collection(told)["bbox"] == bbox
+    geojson_pydantic.FeatureCollection.model_validate_json(text(told))
 
 
-@given(st.lists(st.floats(-180, 180), min_size=1, max_size=6))
-def test_every_place_is_inside_the_box(lons: list[float]) -> None:
-    features = [match_feature(placed(lon)) for lon in lons]
-    west, _, east, _ = feature_collection(features)["bbox"]
-    width = (east - west) % 360.0
-    for feature in features:
-        assert feature["geometry"] is not None
-        lon = feature["geometry"]["coordinates"][0]
-        assert west <= lon <= east or (lon - west) % 360.0 <= width + 1e-9
+def test_across_longitude_180_the_box_is_as_the_rfc_has_it() -> None:
+    told = [match_feature(placed(177.0, -20.0)), match_feature(placed(-178.0, -16.0))]
+    assert feature_collection(told)["bbox"] == [177.0, -20.0, -178.0, -16.0]  # section 5.2
+    with pytest.warns(UserWarning, match="crossing the Antimeridian"):
+        geojson_pydantic.FeatureCollection.model_validate_json(text(told))
 
 
 def test_without_any_place_there_is_no_box() -> None:
@@ -175,12 +146,37 @@ def test_without_any_place_there_is_no_box() -> None:
         "type": "FeatureCollection",
         "features": [error_feature("a.jpg", "why")],
     }
-    assert dumps(feature_collection([])) == '{"type":"FeatureCollection","features":[]}'
+    assert json.loads(text([])) == {"type": "FeatureCollection", "features": []}
+
+
+def test_the_text_is_that_of_the_collection_one_feature_a_line() -> None:
+    told = features()
+    assert json.loads(text(told)) == feature_collection(told)
+    assert len(text(told).splitlines()) == len(told) + 2
+
+
+def test_features_are_written_as_they_come() -> None:
+    asked: list[int] = []
+
+    def coming() -> Iterator[Feature]:
+        for number in range(3):
+            asked.append(number)
+            yield error_feature(f"{number}.jpg", "why")
+
+    pieces = collection_text(coming())
+    for piece in pieces:
+        if "0.jpg" in piece:
+            break
+    assert asked == [0]
 
 
 def test_a_number_that_is_none_is_never_written() -> None:
     with pytest.raises(ValueError, match="JSON"):
-        dumps(feature_collection([match_feature(replace(MATCH, score=math.nan))]))
+        text([match_feature(replace(MATCH, score=math.nan))])
+    with pytest.raises(ValueError, match="JSON"):
+        text([estimate_feature(replace(ESTIMATE, radius_m=math.nan))])
+    with pytest.raises(ValueError, match="JSON"):
+        text([], {"accuracy_m": math.inf})
 
 
 def test_coordinates_of_another_system_are_refused() -> None:
@@ -188,7 +184,16 @@ def test_coordinates_of_another_system_are_refused() -> None:
         match_feature(placed(652000.0, 6861000.0))
 
 
-def test_a_file_name_that_is_no_utf_8_comes_back_the_same() -> None:
-    name = b"caf\xe9.jpg".decode("utf-8", "surrogateescape")
-    written = dumps(feature_collection([error_feature(name, "why")])).encode("utf-8")
+@pytest.mark.parametrize(
+    "name",
+    [
+        b"caf\xe9.jpg".decode("utf-8", "surrogateescape"),
+        "明信片/巴黎.jpg",
+        "x" * 5000 + ".jpg",
+        '"\\\u2028\n</script>.jpg',
+        "\ud800",
+    ],
+)
+def test_any_file_name_comes_back_the_same(name: str) -> None:
+    written = text([error_feature(name, "why")]).encode("utf-8")
     assert json.loads(written)["features"][0]["properties"]["query"] == name

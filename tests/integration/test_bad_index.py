@@ -126,9 +126,9 @@ def test_damage_that_a_worker_finds_is_told_and_the_worker_lives(
     overwrite(damaged / file, start, content)
     photo = [str(small_survey / "00.jpg")]
     with pytest.raises(BadIndex) as error:
-        locate_photos(OpenedIndex(damaged), photo, PAIR, engine.follower, lambda: None)
+        next(locate_photos(OpenedIndex(damaged), photo, PAIR, engine.follower, lambda: None))
     assert says in str(error.value)
-    again = locate_photos(OpenedIndex(whole), photo, PAIR, engine.follower, lambda: None)[0]
+    again = next(locate_photos(OpenedIndex(whole), photo, PAIR, engine.follower, lambda: None))
     assert again.error is None
 
 

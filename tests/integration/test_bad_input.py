@@ -245,7 +245,7 @@ def test_without_a_readable_query_evaluate_names_them_all(
     path = tmp_path / "truth.json"
     path.write_text(json.dumps({"gone.jpg": [f"nf/{SAME_IN_NFC}.jpg"], "\ud800.jpg": ["deep.png"]}))
     opened = OpenedIndex(mixed[0] / "idx")  # a first photo, so that the workers surely listen
-    locate_photos(opened, ["gone.jpg"], SearchConfig(), engine.follower, lambda: None)
+    list(locate_photos(opened, ["gone.jpg"], SearchConfig(), engine.follower, lambda: None))
     broker = ("--broker", engine.app.conf.broker_url)
     code, said = say("evaluate", "--index", mixed[0] / "idx", "--truth", path, *broker)
     assert code == 2, said

@@ -8,10 +8,12 @@ import time
 from contextlib import nullcontext
 from pathlib import Path
 
+import pyogrio
 import pytest
 from flaneur_command import FLANEUR, run
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from coordinator import querying
 from coordinator.cli.show import Bars
 from coordinator.engine import Engine, running_engine
 from coordinator.indexing import IndexReport, run_job
@@ -84,7 +86,8 @@ def test_each_image_finds_itself_at_its_place(
 ) -> None:
     photos = [str(small_survey / f"{number:02d}.jpg") for number in range(10)]
     opened = OpenedIndex(indexed[0])
-    located = locate_photos(opened, photos, SearchConfig(), engine.follower, lambda: None)
+    located = list(locate_photos(opened, photos, SearchConfig(), engine.follower, lambda: None))
+    assert [answer.query for answer in located] == photos
     for number, answer in enumerate(located):
         first = answer.of_kind("match")[0]
         assert first["properties"]["image"] == f"{number:02d}.jpg"
@@ -102,9 +105,32 @@ def test_one_unreadable_photo_stops_no_other(
     broken.write_bytes((small_survey / "00.jpg").read_bytes()[:2000])
     photos = [str(broken), str(tmp_path / "missing.jpg"), str(small_survey / "03.jpg")]
     opened = OpenedIndex(indexed[0])
-    located = locate_photos(opened, photos, SearchConfig(), engine.follower, lambda: None)
+    located = list(locate_photos(opened, photos, SearchConfig(), engine.follower, lambda: None))
     assert [answer.error is not None for answer in located] == [True, True, False]
     assert located[2].of_kind("match")[0]["properties"]["image"] == "03.jpg"
+
+
+def test_answers_come_in_the_order_asked_whatever_the_window(
+    indexed: tuple[Path, IndexReport],
+    small_survey: Path,
+    engine: Engine,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(querying, "WINDOW", 3)
+    photos = [str(small_survey / f"{number:02d}.jpg") for number in (5, 0, 9, 3, 1, 7, 2)]
+    advanced: list[None] = []
+    located = locate_photos(
+        OpenedIndex(indexed[0]),
+        photos,
+        SearchConfig(),
+        engine.follower,
+        lambda: advanced.append(None),
+    )
+    first = next(located)
+    assert first.query == photos[0]
+    assert len(advanced) <= 3, "an answer waits for no window but its own"
+    assert [answer.query for answer in located] == photos[1:]
+    assert len(advanced) == len(photos)
 
 
 INDEX_OPTIONS = ("--crs", "EPSG:2154", "--max-frames", "120", "--max-words", "200")
@@ -219,3 +245,66 @@ def test_one_engine_can_run_several_jobs(
     report = index(small_survey, tmp_path, engine)
     assert report.images_extracted == 10
     assert segment_digests(tmp_path) == segment_digests(indexed[0])
+
+
+def test_several_outputs_and_stdout_say_the_same(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path, engine: Engine
+) -> None:
+    broken = tmp_path / "broken.jpg"
+    broken.write_bytes(b"no picture")
+    asked = ("locate", small_survey / "04.jpg", broken, "--index", indexed[0])
+    broker = ("--broker", engine.app.conf.broker_url)
+    first, second, third = (tmp_path / name for name in ("a.geojson", "b.JSON", "c.gpkg"))
+    told = run(*asked, *broker, "--out", first, "--out", second, "--out", third)
+    assert told.returncode == 3, told.stderr
+    assert f"1 of 2 photos located: {first}, {second}, {third}" in told.stderr
+    assert first.read_bytes() == second.read_bytes()
+    assert set(tmp_path.iterdir()) == {broken, first, second, third}
+    printed = run(*asked, *broker)
+    assert printed.returncode == 3
+    assert printed.stdout == first.read_text("utf-8")
+    results = json.loads(printed.stdout)
+    assert results["flaneur"]["generation"] == 1
+    assert results["flaneur"]["crs"] == "EPSG:2154"
+    assert "RGF93" in results["flaneur"]["operation"]
+    assert results["flaneur"]["accuracy_m"] == 1.0
+    kinds = [each["properties"]["kind"] for each in results["features"]]
+    assert kinds[0] == "match"
+    assert len(pyogrio.read_dataframe(third, layer="matches")) == kinds.count("match")
+    assert kinds[-1] == "error"
+
+
+def test_ctrl_c_keeps_the_answers_so_far_beside_and_nothing_under_the_name(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path, engine: Engine
+) -> None:
+    photos = [tmp_path / f"{number:03d}.jpg" for number in range(300)]
+    for number, photo in enumerate(photos):
+        photo.symlink_to(small_survey / f"{number % 10:02d}.jpg")
+    out = tmp_path / "out" / "results.geojson"
+    command = [*FLANEUR, "locate", *map(str, photos), "--index", str(indexed[0])]
+    command += ["--out", str(out), "--broker", engine.app.conf.broker_url]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 90
+    while time.monotonic() < deadline:
+        if any(path.stat().st_size for path in out.parent.glob(".results.geojson.*")):
+            break
+        time.sleep(0.02)
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate(timeout=60)
+    assert running.returncode == 1
+    assert [path.name for path in out.parent.iterdir()] == ["results.partial.geojson"]
+    features = json.loads((out.parent / "results.partial.geojson").read_bytes())["features"]
+    queries = list(dict.fromkeys(each["properties"]["query"] for each in features))
+    assert queries == [str(photo) for photo in photos[: len(queries)]]
+    assert 0 < len(queries) < 300
+    assert f"The answers to {len(queries)} photos until then are kept" in said
+
+
+def test_an_output_that_cannot_be_is_refused_before_the_work(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
+) -> None:
+    photo, out = small_survey / "04.jpg", tmp_path / "results.shp"
+    told = run("locate", photo, "--index", indexed[0], "--out", out)
+    assert told.returncode == 2
+    assert "'.shp' is no format that is written" in told.stderr
+    assert "to do" not in told.stderr

@@ -1,7 +1,11 @@
 import math
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from PIL import Image
 from PIL.TiffImagePlugin import IFDRational
 
@@ -123,8 +127,22 @@ def test_what_is_no_image_is_skipped_with_its_reason(tmp_path: Path) -> None:
         (
             {0x9003: "2020:05:01 10:11:12"},
             {29: "2020:05:01", 7: (8.0, 11.0, 13.9)},
-            "2020-05-01T08:11:13Z",
+            "2020-05-01T08:11:13.900Z",
         ),
+        (
+            {0x9003: "2020:05:01 10:11:12", 0x9011: "+02:00", 0x9291: "45"},
+            {},
+            "2020-05-01T10:11:12.450+02:00",
+        ),
+        (
+            {0x9003: "2020:05:01 10:11:12", 0x9011: "+02:00", 0x9291: "x"},
+            {},
+            "2020-05-01T10:11:12+02:00",
+        ),
+        ({0x9003: "2023:02:29 10:11:12", 0x9011: "Z"}, {}, None),
+        ({}, {29: "2024:02:29", 7: (23.0, 59.0, 59.9999)}, "2024-02-29T23:59:59.999Z"),
+        ({}, {29: "2024:02:29", 7: (25.0, 0.0, 0.0)}, None),
+        ({}, {29: "2024:02:29", 7: (8.0, 0.0)}, None),
         ({0x9003: "2020:05:01 10:11:12"}, {}, None),
         ({}, {29: "2020:13:01", 7: (8.0, 11.0, 13.0)}, None),
         ({}, {}, None),
@@ -150,6 +168,46 @@ def test_the_field_of_view_is_that_of_the_upright_image(
     assert (camera.width_px, camera.height_px) == (width, height)
 
 
+@pytest.mark.parametrize(
+    ("error", "expected"), [(3.5, 3.5), (0.0, None), (IFDRational(0, 0), None), (None, None)]
+)
+def test_the_stated_error_of_a_position_is_kept(
+    tmp_path: Path, error: object, expected: float | None
+) -> None:
+    gps = PARIS | ({} if error is None else {31: error})
+    assert pose_of(read(tmp_path, gps)).position_error_m == expected
+
+
+@pytest.mark.parametrize(
+    ("version", "reference", "altitude", "crs"),
+    [
+        (b"0300", 0, 12.5, "EPSG:4979"),
+        (b"0310", 1, -12.5, "EPSG:4979"),
+        (b"0300", 2, 12.5, "EPSG:4326"),
+        (b"0300", 3, -12.5, "EPSG:4326"),
+        (b"0232", 0, 12.5, "EPSG:4326"),
+        (b"03", 0, 12.5, "EPSG:4326"),
+        (b"\xff\xff\xff\xff", 1, -12.5, "EPSG:4326"),
+        (None, 0, 12.5, "EPSG:4326"),
+    ],
+)
+def test_a_height_counts_from_the_ellipsoid_only_where_exif_3_says_so(
+    tmp_path: Path, version: bytes | None, reference: int, altitude: float, crs: str
+) -> None:
+    gps = PARIS | {5: bytes([reference]), 6: 12.5}
+    details: dict[int, object] = {} if version is None else {0x9000: version}
+    survey = read(tmp_path, gps, details)
+    assert survey.crs == crs
+    assert {image.pose.crs for image in survey.images if image.pose} == {crs}
+    assert pose_of(survey).altitude_m == altitude
+
+
+def test_heights_of_two_kinds_are_of_no_known_kind(tmp_path: Path) -> None:
+    photo(tmp_path / "b.jpg", PARIS | {5: b"\2", 6: 12.5}, {0x9000: b"0300"})
+    survey = read(tmp_path, PARIS | {5: b"\0", 6: 12.5}, {0x9000: b"0300"})
+    assert survey.crs == "EPSG:4326"
+
+
 def test_photos_without_any_position_are_refused(tmp_path: Path) -> None:
     photo(tmp_path / "a.jpg", {})
     with pytest.raises(BadSurvey, match="--no-pose"):
@@ -165,3 +223,114 @@ def test_real_photos_lie_where_they_were_taken(test_data: Path) -> None:
         assert image.pose is not None
         place = towns[image.uri.split("/")[0]]
         assert (image.pose.easting, image.pose.northing) == pytest.approx(place, abs=0.02)
+
+
+def with_xmp(path: Path, gps: dict[int, object], attributes: str, size: tuple[int, int]) -> None:
+    exif = Image.Exif()
+    exif.get_ifd(0x8825).update(gps)
+    exif.get_ifd(0x8769).update({0xA405: 28})
+    xmp = (
+        '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/'
+        '22-rdf-syntax-ns#"><rdf:Description xmlns:GPano="http://ns.google.com/photos/1.0/'
+        'panorama/" xmlns:drone-dji="http://www.dji.com/drone-dji/1.0/" '
+        f"{attributes}/></rdf:RDF></x:xmpmeta>"
+    )
+    Image.new("RGB", size).save(path, exif=exif, xmp=xmp.encode())
+
+
+def test_a_panorama_looks_where_its_gpano_says(tmp_path: Path) -> None:
+    attributes = (
+        'GPano:ProjectionType="equirectangular" GPano:PoseHeadingDegrees="200.5" '
+        'GPano:PosePitchDegrees="-2" GPano:PoseRollDegrees="3"'
+    )
+    with_xmp(tmp_path / "a.jpg", PARIS | {16: "M", 17: 11.0}, attributes, (64, 32))
+    survey = read_survey(tmp_path, ReadOptions(cut_panoramas=False))
+    pose = pose_of(survey)
+    assert (pose.heading_deg, pose.pitch_deg, pose.roll_deg) == (200.5, -2.0, 3.0)
+    assert pose.north == "true"
+    assert survey.images[0].camera.hfov_deg == 360.0
+
+
+def test_a_panorama_becomes_views_with_poses_of_their_own(tmp_path: Path) -> None:
+    attributes = 'GPano:ProjectionType="equirectangular" GPano:PoseHeadingDegrees="200"'
+    with_xmp(tmp_path / "a.jpg", PARIS | {31: 3.0}, attributes, (64, 32))
+    photo(tmp_path / "b.jpg", PARIS)
+    survey = read_survey(tmp_path, ReadOptions())
+    poses = {image.uri: image.pose for image in survey.images}
+    assert len(poses) == 9
+    view = poses["a.jpg#yaw=270&pitch=0&fov=80"]
+    assert view is not None
+    assert (view.heading_deg, view.north, view.position_error_m) == (110.0, "true", 3.0)
+    assert [image.uri for image in survey.images] == sorted(poses)
+
+
+def test_a_photograph_looks_where_its_exif_says_before_its_xmp(tmp_path: Path) -> None:
+    attributes = 'drone-dji:GimbalYawDegree="-114.2" drone-dji:GimbalPitchDegree="-5"'
+    with_xmp(tmp_path / "a.jpg", PARIS | {16: "M", 17: 11.0}, attributes, (60, 40))
+    with_xmp(tmp_path / "b.jpg", PARIS, attributes, (60, 40))
+    survey = read_survey(tmp_path, ReadOptions())
+    first, second = pose_of(survey), pose_of(survey, "b.jpg")
+    assert (first.heading_deg, first.north, first.pitch_deg) == (11.0, "magnetic", -5.0)
+    assert second.heading_deg == pytest.approx(245.8)
+    assert second.north == "true"
+
+
+def test_xmp_that_cannot_be_read_is_told_and_the_photo_kept(tmp_path: Path) -> None:
+    photo(tmp_path / "good.jpg", PARIS)
+    with_xmp(tmp_path / "a.jpg", PARIS, "broken<", (60, 40))
+    survey = read_survey(tmp_path, ReadOptions())
+    assert len(survey.images) == 2
+    (note,) = (note for note in survey.notes if "XMP" in note)
+    assert note.startswith("XMP of 1 images is left out; the first is a.jpg: XMP that is not XML")
+
+
+@pytest.mark.skipif(shutil.which("exiftool") is None, reason="exiftool is not installed")
+def test_what_exiftool_writes_is_read(tmp_path: Path) -> None:
+    Image.new("RGB", (64, 32)).save(tmp_path / "a.jpg")
+    tags = {
+        "GPSLatitude": "48.8584",
+        "GPSLatitudeRef": "N",
+        "GPSLongitude": "2.2945",
+        "GPSLongitudeRef": "W",
+        "GPSAltitude": "33.25",
+        "GPSAltitudeRef#": "1",
+        "GPSImgDirection": "271.5",
+        "GPSImgDirectionRef": "M",
+        "GPSHPositioningError": "2.5",
+        "GPSDateStamp": "2024:02:29",
+        "GPSTimeStamp": "10:20:30.5",
+        "XMP-GPano:ProjectionType": "equirectangular",
+        "XMP-GPano:PoseHeadingDegrees": "15.25",
+        "XMP-GPano:PosePitchDegrees": "1.5",
+        "XMP-GPano:PoseRollDegrees": "-0.5",
+    }
+    command = ["exiftool", "-q", "-overwrite_original"]
+    command += [f"-{name}={value}" for name, value in tags.items()]
+    subprocess.run([*command, str(tmp_path / "a.jpg")], check=True, timeout=60)
+    survey = read_survey(tmp_path, ReadOptions(cut_panoramas=False))
+    pose = pose_of(survey)
+    assert (pose.easting, pose.northing) == pytest.approx((-2.2945, 48.8584), abs=1e-7)
+    assert (pose.altitude_m, pose.position_error_m) == (-33.25, 2.5)
+    assert (pose.heading_deg, pose.pitch_deg, pose.roll_deg) == (15.25, 1.5, -0.5)
+    assert survey.images[0].captured_at == "2024-02-29T10:20:30.500Z"
+
+
+@settings(max_examples=60, deadline=None)
+@example([(17, 2)])  # a pointer to a directory that is two pointers
+@given(st.lists(st.tuples(st.integers(8, 420), st.integers(0, 255)), min_size=1, max_size=12))
+def test_tags_of_any_type_and_count_are_read_or_the_photo_is_skipped(
+    tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, int]]
+) -> None:
+    """Bytes of a good EXIF block are changed: types, counts, offsets and values."""
+    exif = Image.Exif()
+    exif.get_ifd(0x8825).update(PARIS | {5: b"\0", 6: 12.5, 7: (8.0, 11.0, 13.0), 16: "T", 17: 7.5})
+    exif.get_ifd(0x8825).update({29: "2020:05:01", 31: 2.0})
+    exif.get_ifd(0x8769).update({0x9003: "2020:05:01 10:11:12", 0x9011: "+02:00", 0xA405: 26})
+    block = bytearray(exif.tobytes())
+    for at, value in changes:
+        block[min(6 + at, len(block) - 1)] = value
+    folder = tmp_path_factory.mktemp("odd")
+    Image.new("RGB", (36, 24)).save(folder / "a.jpg", exif=bytes(block))
+    photo(folder / "good.jpg", PARIS)
+    survey = read_survey(folder, ReadOptions())
+    assert len(survey.images) + len(survey.skipped) == 2

@@ -177,15 +177,15 @@ def test_one_far_pose_among_good_ones_is_skipped(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("cells", "reason"),
     [
-        ("nan,6862000,1,2,3", "row 3: easting is nan"),
-        ("652000,inf,1,2,3", "row 3: northing is inf"),
-        ("652000,,1,2,3", "row 3: image without pose"),
-        ("here,6862000,1,2,3", "row 3: easting is 'here'"),
-        ("652000,6862000,nan,2,3", "row 3: heading is nan"),
-        ("652000,6862000,north,2,3", "row 3: heading is 'north'"),
-        ("652000,6862000,1,91,3", "row 3: pitch is 91"),
-        ("652000,6862000,1,2,-9999", "row 3: altitude is -9999"),
-        ("652000", "row 3: image without pose"),
+        ("nan,6862000,1,2,3", "poses.csv row 3 column 'x': easting is 'nan'"),
+        ("652000,inf,1,2,3", "poses.csv row 3 column 'y': northing is 'inf'"),
+        ("652000,,1,2,3", "poses.csv row 3: image without pose"),
+        ("here,6862000,1,2,3", "poses.csv row 3 column 'x': easting is 'here'"),
+        ("652000,6862000,nan,2,3", "poses.csv row 3 column 'heading': heading is 'nan'"),
+        ("652000,6862000,north,2,3", "poses.csv row 3 column 'heading': heading is 'north'"),
+        ("652000,6862000,1,91,3", "poses.csv row 3: pitch is 91"),
+        ("652000,6862000,1,2,-9999", "poses.csv row 3: altitude is -9999"),
+        ("652000", "poses.csv row 3: image without pose"),
     ],
 )
 def test_a_row_with_an_impossible_pose_is_skipped_by_number(
@@ -228,7 +228,7 @@ def test_the_first_of_two_rows_for_one_image_counts(tmp_path: Path) -> None:
 def test_a_row_without_a_file_is_named_by_its_number(tmp_path: Path) -> None:
     table = "file,x,y\na.jpg,652000,6862000\n,652001,6862000\n"
     assert reasons(read_survey(survey_of(tmp_path, table), L93)) == {
-        "row 3": "row 3: names no file"
+        "row 3": "poses.csv row 3: names no file"
     }
 
 

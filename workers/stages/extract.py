@@ -64,6 +64,7 @@ def image_features(image: PosedImage, config: FeatureConfig) -> tuple[DecodedIma
     """Decode one image as the survey says it is stored, and describe it."""
     decoded = decode_image(
         image.path,
+        fragment=image.fragment,
         quarter_turns=image.quarter_turns,
         max_side_px=config.max_side_px,
         max_pixels=config.max_pixels,
@@ -73,6 +74,7 @@ def image_features(image: PosedImage, config: FeatureConfig) -> tuple[DecodedIma
         height, width = decoded.rgb.shape[:2]
         usable = decode_mask(
             image.mask_path,
+            fragment=image.fragment,
             quarter_turns=image.quarter_turns,
             width=width,
             height=height,

@@ -38,7 +38,7 @@ def locate_photo(request: LocateMessage) -> dict[str, Any]:
         scores = search_photo(index, photo, chosen, request.search)
     matches = rank(scores, max(request.search.top, ESTIMATE_FROM))
     if matches:
-        features = place(index, request.query, chosen, matches, request.search.top)
+        features = place(index, request.query, chosen, matches, request.search.top, scores)
     else:
         reason = "no image of the index shares a visual word with it: does it show a place?"
         features = [error_feature(request.query, reason)]

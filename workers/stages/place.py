@@ -1,98 +1,176 @@
-"""Place: the matches of a photo become GeoJSON features, with an estimate where one can be had."""
+"""Place: the matches of a photo become GeoJSON features, and with them what they say together.
+
+The estimate is where the photographer stood, the target what they looked at; both are had from
+the first few matches, and how sure they are from the scores of all images.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contracts.records import Match
-from geo.crs import ToWgs84
-from geo.estimate import consensus_lon_lat
-from geo.geojson import Feature, PlacedEstimate, PlacedMatch, estimate_feature, match_feature
-from geo.headings import true_heading_deg
+from geo.confidence import Evidence, prominence
+from geo.estimate import LonLatConsensus, consensus_lon_lat
+from geo.frames import LocalMetres
+from geo.geojson import (
+    Feature,
+    PlacedEstimate,
+    PlacedMatch,
+    PlacedTarget,
+    estimate_feature,
+    match_feature,
+    target_feature,
+)
+from geo.sightlines import LonLatTarget, target_lon_lat
 from index.catalogue import CatalogueRow
+from index.models import placing_model
 from index.opened import OpenedIndex
+from retrieval.fusion import Scores
+from retrieval.score_curves import curve_features
+from survey.uris import image_uri
 from workers.stages.retrieve import Chosen
+from workers.stages.spots import Ground, Spots, ground_of, spots_of
 
 ESTIMATE_FROM = 10
 """Matches that the estimate looks at, however many are asked for."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Spot:
-    """Where an image stands in WGS 84; NaN and None: not known."""
+class Finding:
+    """What the first matches say together, and what speaks for it.
 
-    lon_deg: float
-    lat_deg: float
-    heading_deg: float | None
+    distances_m : (n,) from the place to cameras all over the survey. position_error_m : that the
+    survey states for the matches, 0 where it states none.
+    """
+
+    place: LonLatConsensus
+    evidence: Evidence
+    distances_m: NDArray[np.float64]
+    position_error_m: float
+    target: LonLatTarget | None
 
 
 def place(
-    index: OpenedIndex, query: str, chosen: Chosen, matches: Sequence[Match], top: int
+    index: OpenedIndex,
+    query: str,
+    chosen: Chosen,
+    matches: Sequence[Match],
+    top: int,
+    scores: Scores,
 ) -> list[Feature]:
-    """The first `top` matches as features, and the estimate from the first few."""
+    """The first `top` matches as features, then the estimate and the target where there are any.
+
+    matches : the first of the ranking, `ESTIMATE_FROM` or more. scores : of all images.
+    """
     rows = index.catalogue.rows([match.image_id for match in matches])
-    spots = _spots(rows, index.generation.crs)
+    ground = ground_of(index)
+    spots = spots_of(rows, ground)
     features = [
-        match_feature(
-            PlacedMatch(
-                query=query,
-                rank=match.rank,
-                score=match.score,
-                image=row.uri,
-                uri=row.path,
-                image_id=row.image_id,
-                lon_deg=spot.lon_deg,
-                lat_deg=spot.lat_deg,
-                heading_deg=spot.heading_deg,
-                pitch_deg=row.pitch_deg,
-                roll_deg=row.roll_deg,
-                hfov_deg=row.hfov_deg,
-                captured_at=row.captured_at,
-                detectors=chosen.detectors,
-                k=chosen.k,
-                predicted_map=chosen.predicted_map,
-                choice=chosen.choice,
-                generation=index.generation.number,
-            )
-        )
-        for match, row, spot in zip(matches[:top], rows, spots, strict=False)
+        match_feature(_placed(index, query, chosen, match, row, spots, at))
+        for at, (match, row) in enumerate(zip(matches[:top], rows, strict=False))
     ]
-    found = consensus_lon_lat(
-        [spot.lon_deg for spot in spots[:ESTIMATE_FROM]],
-        [spot.lat_deg for spot in spots[:ESTIMATE_FROM]],
-        [match.score for match in matches[:ESTIMATE_FROM]],
-    )
-    if found is None:
+    finding = None if ground is None else find(matches, rows, spots, ground, scores)
+    if finding is None:
         return features
-    estimate = PlacedEstimate(
+    return [*features, *_found(query, chosen, finding)]
+
+
+def find(
+    matches: Sequence[Match],
+    rows: Sequence[CatalogueRow],
+    spots: Spots,
+    ground: Ground,
+    scores: Scores,
+) -> Finding | None:
+    """What the first matches say together; None where none of them has a place.
+
+    Parameters
+    ----------
+    matches, rows, spots : of the first of the ranking, in one order.
+    """
+    first = slice(0, ESTIMATE_FROM)
+    lon, lat = spots.lon_deg[first], spots.lat_deg[first]
+    score = [match.score for match in matches[first]]
+    found = consensus_lon_lat(lon, lat, score)
+    if found is None:
+        return None
+    n_images = len(scores.values)
+    standing = prominence(curve_features(scores, n_images).z_score, n_images)
+    measured = [not row.heading_derived for row in rows[first]]
+    hfov = [np.nan if row.hfov_deg is None else row.hfov_deg for row in rows[first]]
+    x_m, y_m = LocalMetres(found.lon_deg, found.lat_deg).from_lon_lat(
+        ground.lon_deg, ground.lat_deg
+    )
+    stated = [row.position_error_m for row in rows[first] if row.position_error_m is not None]
+    return Finding(
+        place=found,
+        evidence=Evidence(standing, found.share),
+        distances_m=np.hypot(x_m, y_m),
+        position_error_m=float(np.median(stated)) if stated else 0.0,
+        target=target_lon_lat(
+            lon, lat, np.where(measured, spots.heading_deg[first], np.nan), hfov, score
+        ),
+    )
+
+
+def _found(query: str, chosen: Chosen, finding: Finding) -> list[Feature]:
+    """The estimate, with how sure it is, and the target."""
+    certainty = placing_model().certainty(
+        finding.evidence, finding.distances_m, finding.position_error_m
+    )
+    estimate = estimate_feature(
+        PlacedEstimate(
+            query=query,
+            lon_deg=finding.place.lon_deg,
+            lat_deg=finding.place.lat_deg,
+            radius_m=certainty.radius_68_m,
+            support=finding.place.support,
+            detectors=chosen.detectors,
+            k=chosen.k,
+            choice=chosen.choice,
+            radius_95_m=certainty.radius_95_m,
+            confidence=certainty.confidence,
+            in_survey=certainty.in_survey,
+        )
+    )
+    target = finding.target
+    if target is None:
+        return [estimate]
+    placed = PlacedTarget(query, target.lon_deg, target.lat_deg, target.radius_m, target.support)
+    return [estimate, target_feature(placed)]
+
+
+def _placed(
+    index: OpenedIndex,
+    query: str,
+    chosen: Chosen,
+    match: Match,
+    row: CatalogueRow,
+    spots: Spots,
+    at: int,
+) -> PlacedMatch:
+    return PlacedMatch(
         query=query,
-        lon_deg=found.lon_deg,
-        lat_deg=found.lat_deg,
-        radius_m=found.radius_m,
-        support=found.support,
+        rank=match.rank,
+        score=match.score,
+        image=row.uri,
+        uri=image_uri(row.path, row.fragment),
+        image_id=row.image_id,
+        lon_deg=float(spots.lon_deg[at]),
+        lat_deg=float(spots.lat_deg[at]),
+        heading_deg=float(spots.heading_deg[at]),
+        pitch_deg=row.pitch_deg,
+        roll_deg=row.roll_deg,
+        hfov_deg=row.hfov_deg,
+        captured_at=row.captured_at,
         detectors=chosen.detectors,
         k=chosen.k,
+        predicted_map=chosen.predicted_map,
         choice=chosen.choice,
+        generation=index.generation.number,
+        height_m=float(spots.height_m[at]),
+        heading_derived=row.heading_derived,
+        position_error_m=row.position_error_m,
     )
-    return [*features, estimate_feature(estimate)]
-
-
-def _spots(rows: Sequence[CatalogueRow], crs: str | None) -> list[_Spot]:
-    unknown = _Spot(np.nan, np.nan, None)
-    posed = [n for n, row in enumerate(rows) if row.easting is not None]
-    spots = [unknown] * len(rows)
-    if crs is None or not posed:
-        return spots
-    converter = ToWgs84(crs)
-    easting = np.array([rows[n].easting for n in posed], dtype=np.float64)
-    northing = np.array([rows[n].northing for n in posed], dtype=np.float64)
-    lon, lat = converter.lon_lat(easting, northing)
-    convergence = converter.convergence_deg(easting, northing)
-    for at, n in enumerate(posed):
-        north = rows[n].north
-        heading = (
-            true_heading_deg(rows[n].heading_deg, north, float(convergence[at])) if north else None
-        )
-        spots[n] = _Spot(float(lon[at]), float(lat[at]), heading)
-    return spots

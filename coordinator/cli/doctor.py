@@ -1,0 +1,103 @@
+"""`flaneur doctor`: what is wrong with a survey, before any work."""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from contracts.errors import BadConfig
+from coordinator.cli.lists import SOME_SKIPPED
+from coordinator.cli.outputs import result_file, result_folder, utf_8
+from coordinator.cli.show import stdout, tell
+from coordinator.cli.survey_options import (
+    AllowBallpark,
+    Crs,
+    Exclude,
+    Format,
+    Include,
+    Mapping,
+    MaxGap,
+    NoPose,
+    North,
+    SurveyPath,
+)
+
+if TYPE_CHECKING:  # survey is imported when the verb runs
+    from survey.doctor import Examination
+
+NAME = "doctor"
+ERRORS = 2
+"""Exit code: `flaneur index` would refuse the survey or place photos wrongly."""
+
+
+def command(
+    survey: SurveyPath,
+    include: Include = None,
+    exclude: Exclude = None,
+    crs: Crs = None,
+    north: North = None,
+    no_pose: NoPose = False,
+    survey_format: Format = None,
+    mapping: Mapping = None,
+    max_gap: MaxGap = 1.0,
+    allow_ballpark: AllowBallpark = False,
+    no_masks: Annotated[
+        bool, typer.Option("--no-masks", help="Ignore the survey's masks.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="A folder for report.json, report.txt and track.png.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="A map of the track alone: a .png file.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Report as JSON on stdout.")] = False,
+) -> int:
+    """Look for what is wrong with a survey, and say what mends it. Nothing is indexed.
+
+    Exit code 0: nothing worse than a note; 3: warnings; 2: errors.
+    """
+    from coordinator.export.examination import as_dict, as_text, write_picture, write_report
+    from survey import ReadOptions
+    from survey.doctor import examine
+
+    folder = None if out is None else result_folder(out)
+    drawing = None if picture is None else _png(picture)
+    options = ReadOptions(
+        crs=crs,
+        north=north,
+        no_pose=no_pose,
+        include=tuple(include or ()),
+        exclude=tuple(exclude or ()),
+        format=survey_format,
+        use_masks=not no_masks,
+        mapping=mapping,
+        max_gap_s=max_gap,
+        allow_ballpark=allow_ballpark,
+    )
+    examination = examine(survey.absolute(), options, datetime.now(UTC))
+    if folder is not None:
+        write_report(folder, examination)
+        tell(f"Report: {out}")
+    if drawing is not None:
+        drawn = write_picture(drawing, examination)
+        tell(f"Drawn: {picture}" if drawn else "Nothing drawn: no position can be used")
+    if as_json:
+        typer.echo(utf_8(json.dumps(as_dict(examination), ensure_ascii=False, allow_nan=False)))
+    else:
+        stdout.print(as_text(examination), markup=False, soft_wrap=not stdout.is_terminal)
+    return _exit_code(examination)
+
+
+def _png(picture: Path) -> Path:
+    if picture.suffix.lower() != ".png":
+        raise BadConfig(f"--picture takes a name that ends in .png; got {str(picture)!r}")
+    return result_file(picture)
+
+
+def _exit_code(examination: "Examination") -> int:
+    severities = {finding.severity for finding in examination.findings}
+    if "error" in severities:
+        return ERRORS
+    return SOME_SKIPPED if "warning" in severities else 0

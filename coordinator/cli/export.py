@@ -1,0 +1,112 @@
+"""`flaneur export`: surveys, indices and results in the formats of other software."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coordinator.cli.lists import SOME_SKIPPED
+from coordinator.cli.outputs import result_file, utf_8
+from coordinator.cli.show import bars, list_skipped, tell
+from coordinator.cli.survey_options import (
+    Crs,
+    Exclude,
+    Format,
+    Include,
+    Mapping,
+    MaxGap,
+    NoPose,
+    North,
+    SurveyPath,
+)
+
+NAME = "export"
+HELP = "Write a survey, an index or results in the formats of other software."
+
+
+def mcap(
+    survey: SurveyPath,
+    out: Annotated[Path, typer.Argument(metavar="OUT.mcap", help="The MCAP file.")],
+    include: Include = None,
+    exclude: Exclude = None,
+    crs: Crs = None,
+    north: North = None,
+    no_pose: NoPose = False,
+    survey_format: Format = None,
+    mapping: Mapping = None,
+    max_gap: MaxGap = 1.0,
+) -> int:
+    """A survey as one MCAP file: images, places and attitudes, for Foxglove and ROS 2."""
+    from coordinator.export.mcap import write_mcap
+    from survey import ReadOptions, read_survey
+
+    options = ReadOptions(
+        crs=crs,
+        north=north,
+        no_pose=no_pose,
+        include=tuple(include or ()),
+        exclude=tuple(exclude or ()),
+        format=survey_format,
+        mapping=mapping,
+        max_gap_s=max_gap,
+        # What the survey itself says, nothing made of it: whole panoramas, measured headings.
+        cut_panoramas=False,
+        derive_headings=False,
+    )
+    out = result_file(out, (survey,))
+    found = read_survey(survey.absolute(), options)
+    with bars() as progress:
+        progress.begin("mcap", len(found.images), 0)
+        written = write_mcap(found, out, lambda: progress.advance("mcap"))
+    skipped = (*found.skipped, *written.skipped)
+    list_skipped(skipped, "the survey")
+    tell(f"{written.n_images} of {len(found.images) + len(found.skipped)} images: {out}")
+    return SOME_SKIPPED if skipped else 0
+
+
+def stac(
+    index: Annotated[Path, typer.Argument(help="The index.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")],
+) -> None:
+    """Every image of an index as a STAC item."""
+    from coordinator.export.stac_folder import write_stac
+    from index.opened import OpenedIndex
+
+    opened = OpenedIndex(index.absolute())
+    folder = folder.absolute()
+    with bars() as progress:
+        progress.begin("stac", opened.n_images, 0)
+        write_stac(opened, folder, lambda: progress.advance("stac"))
+    tell(f"{opened.n_images} items: {folder / 'collection.json'}")
+
+
+def navplace(
+    results: Annotated[
+        Path, typer.Argument(metavar="RESULTS.geojson", help="Written by `flaneur locate`.")
+    ],
+    manifest: Annotated[
+        Path, typer.Argument(metavar="MANIFEST.json", help="Of IIIF Presentation 3.")
+    ],
+    out: Annotated[Path, typer.Option(help="The manifest with places.")],
+) -> int:
+    """Estimates on the canvases of a IIIF manifest (navPlace)."""
+    from coordinator.export.files import write_whole
+    from coordinator.export.json_files import read_json, read_results
+    from coordinator.export.navplace import with_places
+
+    out = result_file(out, (results, manifest))
+    placed = with_places(read_json(manifest), read_results(results), str(manifest))
+    text = json.dumps(placed.manifest, allow_nan=False, ensure_ascii=False, indent=2)
+    write_whole(out, utf_8(text))
+    list_skipped(placed.left_out, "the results")
+    tell(f"{placed.n_placed} of {placed.n_placed + len(placed.left_out)} queries placed: {out}")
+    return SOME_SKIPPED if placed.left_out else 0
+
+
+COMMANDS: dict[str, Callable[..., int | None]] = {
+    "mcap": mcap,
+    "stac": stac,
+    "navplace": navplace,
+}

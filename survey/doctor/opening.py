@@ -1,0 +1,124 @@
+"""Read a survey as far as it can be read: what `read_survey` would refuse is examined as well."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from contracts.errors import BadSurvey, UnknownCrs, WrongInput
+from contracts.records import PosedImage, Skipped
+from geo.crs import ToWgs84
+from survey.doctor.findings import Finding
+from survey.options import Reader, Reading, ReadOptions, selector
+from survey.poses import crs_name
+from survey.readers import choose_reader
+
+_BARE_NUMBERS = "EPSG:3857"
+"""Any projected system will do to read numbers whose own system is not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """What a reader found.
+
+    images, skipped : in order of their uris' bytes. crs : of every pose; None: poses have none,
+    or `bare`. bare : coordinates are numbers whose system is not known or cannot be right.
+    findings : why it would be refused, and what the reader itself has to say.
+    """
+
+    path: Path
+    format: str
+    images: tuple[PosedImage, ...]
+    skipped: tuple[Skipped, ...]
+    crs: str | None
+    bare: bool
+    findings: tuple[Finding, ...]
+
+
+def open_survey(path: Path, options: ReadOptions) -> Opened:
+    """Read the survey; a refusal by its reader is a finding.
+
+    Raises
+    ------
+    BadSurvey : nothing is there, or no reader knows it. BadConfig : no reader of that name.
+    UnknownCrs : `options.crs` is no coordinate system.
+    """
+    if options.crs is not None:
+        crs_name(options.crs)
+    try:
+        if not path.exists():
+            raise BadSurvey(f"survey {path} does not exist; check the path")
+        reader = choose_reader(path, options)
+    except OSError as error:
+        raise BadSurvey(f"survey {path} cannot be looked into: {error.strerror}") from error
+    try:
+        reading = _read(reader, path, options)
+    except WrongInput as error:
+        refusal = Finding("refused", "error", str(error), mend=_mend(error))
+        return _opened(path, reader, _bare(reader, path, options), (refusal,), bare=True)
+    notes = tuple(Finding("reader", "note", note) for note in reading.notes)
+    if not reading.images and reading.skipped:
+        bare = _bare(reader, path, options)
+        if bare.images:  # only the coordinate system stood in the way
+            return _opened(path, reader, bare, (*notes, _none_usable(reading.skipped)), bare=True)
+    refused = _refused_crs(reading, options)
+    return _opened(path, reader, reading, notes + refused, bare=bool(refused))
+
+
+def _opened(
+    path: Path, reader: Reader, reading: Reading, findings: tuple[Finding, ...], bare: bool
+) -> Opened:
+    return Opened(
+        path=path,
+        format=reader.name,
+        images=tuple(sorted(reading.images, key=lambda image: image.uri.encode())),
+        skipped=tuple(sorted(reading.skipped, key=lambda skip: (skip.uri.encode(), skip.reason))),
+        crs=None if bare else reading.crs,
+        bare=bare,
+        findings=findings,
+    )
+
+
+def _read(reader: Reader, path: Path, options: ReadOptions) -> Reading:
+    wanted = selector(options)
+    reading = reader.read(path, options, wanted)
+    images = [image for image in reading.images if wanted(image.uri)]
+    if options.no_pose:
+        images = [replace(image, pose=None) for image in images]
+    return replace(
+        reading,
+        images=tuple(images),
+        skipped=tuple(skip for skip in reading.skipped if wanted(skip.uri)),
+        crs=None if options.no_pose else reading.crs,
+    )
+
+
+def _bare(reader: Reader, path: Path, options: ReadOptions) -> Reading:
+    """The survey with its coordinates as mere numbers, or empty where that fails as well."""
+    try:
+        return _read(reader, path, replace(options, crs=_BARE_NUMBERS))
+    except WrongInput:
+        return Reading((), (), None)
+
+
+def _refused_crs(reading: Reading, options: ReadOptions) -> tuple[Finding, ...]:
+    if reading.crs is None:
+        return ()
+    try:
+        ToWgs84(reading.crs, allow_ballpark=options.allow_ballpark)
+    except UnknownCrs as error:
+        return (Finding("refused", "error", str(error), mend=_mend(error)),)
+    return ()
+
+
+def _none_usable(skipped: Sequence[Skipped]) -> Finding:
+    first = skipped[0]
+    return Finding(
+        "refused",
+        "error",
+        f"not one usable image: all {len(skipped):,} were left out; the first, {first.uri}, "
+        f"because: {first.reason}",
+    )
+
+
+def _mend(error: WrongInput) -> str:
+    return "--crs, such as --crs EPSG:2154" if isinstance(error, UnknownCrs) else ""

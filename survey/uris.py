@@ -1,0 +1,22 @@
+"""URIs that other software can open: of files, and of one image within a file."""
+
+from pathlib import Path
+
+
+def image_uri(path: str, fragment: str = "") -> str:
+    """The `file://` URI (RFC 8089) of an image.
+
+    Every byte of the path that a URI may not hold is percent-encoded, also those of a name that
+    is not UTF-8.
+
+    Parameters
+    ----------
+    path : absolute. fragment : what within the file is the image (`survey.fragments`), already
+        percent-encoded; "" = all of it.
+
+    Raises
+    ------
+    ValueError : `path` is relative, which a `file://` URI cannot be.
+    """
+    uri = Path(path).as_uri()
+    return f"{uri}#{fragment}" if fragment else uri
