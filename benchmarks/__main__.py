@@ -9,11 +9,13 @@ from benchmarks import (
     features,
     fusion,
     kth,
+    mcap,
     pooled,
     poses,
     stereopolis,
     workers,
 )
+from benchmarks.placing import run as placing
 from benchmarks.sets import run as sets
 
 FIGURES = {"stereopolis": stereopolis.run, "kth": kth.run, "workers": workers.run}
@@ -24,7 +26,9 @@ BENCHMARKS = {
     "complementarity": complementarity.run,
     "pooled": pooled.run,
     "poses": poses.run,
+    "mcap": mcap.run,
     "sets": sets.run,
+    "placing": placing.run,
 }
 
 

@@ -114,19 +114,6 @@ class Match:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
-    """Where the photographer probably stood, in the catalogue's CRS.
-
-    radius_m : within which the supporting cameras lie. support : matches that agree.
-    """
-
-    easting: float
-    northing: float
-    radius_m: float
-    support: int
-
-
-@dataclass(frozen=True, slots=True)
 class Receipt:
     """Proof that one task of a job is done: what it wrote, and how much.
 

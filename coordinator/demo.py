@@ -12,6 +12,7 @@ import numpy as np
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.engine import Engine
 from coordinator.export.geojson import provenance, write_geojson
+from coordinator.export.geopackage import write_geopackage
 from coordinator.export.page import write_page
 from coordinator.export.sheets import QuerySheet, SheetMatch, thumbnail_jpeg
 from coordinator.indexing import IndexReport, Progress, run_job
@@ -59,13 +60,14 @@ class DemoRow:
 
 @dataclass(frozen=True, slots=True)
 class DemoReport:
-    """All of a demo. page, geojson : what was written."""
+    """All of a demo. page, geojson, geopackage : what was written."""
 
     index: IndexReport
     rows: tuple[DemoRow, ...]
     seconds_per_photo: float
     page: Path
     geojson: Path
+    geopackage: Path
 
 
 def run_demo(
@@ -100,6 +102,8 @@ def run_demo(
     features = [feature for located in fused for feature in located.features]
     geojson = out / "results.geojson"
     write_geojson(geojson, features, provenance(index))
+    geopackage = out / "results.gpkg"
+    write_geopackage(geopackage, fused, index)
     page = out / "index.html"
     write_page(
         page.absolute(),
@@ -113,7 +117,7 @@ def run_demo(
         },
     )
     seconds = float(np.mean([located.seconds for located in fused]))
-    return DemoReport(report, rows, seconds, page, geojson)
+    return DemoReport(report, rows, seconds, page, geojson, geopackage)
 
 
 class _Judge:

@@ -17,7 +17,7 @@ from contracts.config import IndexConfig
 from contracts.errors import BadIndex
 from index.files import write_bytes
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 
 class FileEntry(BaseModel):
@@ -95,10 +95,10 @@ def live_generation(root: Path) -> Generation:
     except (OSError, ValueError) as error:
         raise BadIndex(f"{path} cannot be read ({error}). Restore it or index again.") from error
     version = content.get("format_version") if isinstance(content, dict) else None
-    if isinstance(version, int) and version > FORMAT_VERSION:
+    if isinstance(version, int) and version != FORMAT_VERSION:
+        mend = "Upgrade Flaneur" if version > FORMAT_VERSION else "Index the survey again"
         raise BadIndex(
-            f"{root} has format version {version}; this Flaneur reads up to {FORMAT_VERSION}. "
-            "Upgrade Flaneur."
+            f"{root} has format version {version}; this Flaneur reads {FORMAT_VERSION}. {mend}."
         )
     try:
         return Generation.model_validate(content)

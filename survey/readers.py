@@ -30,12 +30,14 @@ def choose_reader(path: Path, options: ReadOptions) -> Reader:
             if reader.name == options.format:
                 return reader
         raise BadConfig(f"survey format {options.format!r} is unknown; expected one of {names}")
+    if options.mapping is not None:
+        return tables.READER
     if options.no_pose:
         return plain.READER
     for reader in READERS:
         if reader.recognises(path):
             return reader
     raise BadSurvey(
-        f"{path} is no survey: expected a folder of images or a pose table "
+        f"{path} is no survey: expected a folder of images, a pose table or an MCAP file "
         f"(formats: {names}); name the format with --format if it is one"
     )

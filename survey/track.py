@@ -157,9 +157,12 @@ def _named_by_place(image: PosedImage) -> bool:
 
 
 def _order_key(image: PosedImage) -> tuple[float, list[str | int], str]:
-    pieces = _NUMBERS.split(image.uri)
-    natural = [int(piece) if at % 2 else piece for at, piece in enumerate(pieces)]
-    return _seconds(image), natural, image.uri
+    return _seconds(image), natural_key(image.uri), image.uri
+
+
+def natural_key(uri: str) -> list[str | int]:
+    """By which uris sort as people number them: `9.jpg` before `10.jpg`."""
+    return [int(piece) if at % 2 else piece for at, piece in enumerate(_NUMBERS.split(uri))]
 
 
 def _seconds(image: PosedImage) -> float:

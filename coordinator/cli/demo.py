@@ -72,5 +72,5 @@ def _summary(report: "DemoReport", seconds: float) -> str:
         f"{generation.n_images} images indexed, {report.index.images_extracted} of them now, "
         f"{report.index.bytes_on_disk / max(generation.n_images, 1):,.0f} bytes an image; "
         f"{report.seconds_per_photo:.2f} s a photo; {seconds:.0f} s in all.\n"
-        f"Open {report.page} in a browser, and {report.geojson} in QGIS."
+        f"Open {report.page} in a browser, and {report.geopackage} in QGIS."
     )

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from contracts.errors import FlaneurError, WrongInput
-from coordinator.cli import demo, evaluate, export, index, inspect, locate, train, worker
+from coordinator.cli import demo, doctor, evaluate, export, index, inspect, locate, train, worker
 from coordinator.cli.show import complain
 
 FAILED, WRONG_USAGE = 1, 2
@@ -58,7 +58,7 @@ main = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (demo, index, locate, inspect, train, evaluate, worker):
+for verb in (demo, doctor, index, locate, inspect, train, evaluate, worker):
     main.command(verb.NAME)(_guarded(verb.command))
 exports = typer.Typer(no_args_is_help=True, help=export.HELP)
 for name, command in export.COMMANDS.items():

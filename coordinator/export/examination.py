@@ -153,7 +153,7 @@ def _length(metres: float) -> str:
 
 
 def _hours(hours: float) -> str:
-    return f"{hours:,.1f} hours" if hours >= 1.5 else f"{max(1.0, hours * 60.0):.0f} minutes"
+    return f"{hours:,.1f} h" if hours >= 1.5 else f"{max(1.0, hours * 60.0):.0f} min"
 
 
 def _size(n_bytes: int) -> str:

@@ -1,15 +1,12 @@
 """Figures of results, as PNG: the same table gives the same bytes, whatever the user's settings."""
 
-import io
-import logging
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from contracts.errors import WrongInput
+from coordinator.export.drawing import QUIET_RGB, drawing, shown
 from coordinator.export.tables import Cell, Table, cell_text
 from retrieval.resampling import Interval
 
@@ -20,30 +17,9 @@ if TYPE_CHECKING:  # slow to import, and most commands draw nothing
 OURS_RGB, PAPER_RGB = "#0072b2", "#d55e00"
 """Blue and vermilion of Okabe & Ito (2008), which differ to every eye and in grey."""
 
-_INK_RGB, _QUIET_RGB, _GRID_RGB = "#22272b", "#666e75", "#e2dfd8"
-_DPI = 150
 _ROW_INCHES = 0.3
 _WIDTH_INCHES = 9.0
-_LABEL_CHARS = 44
 _PANEL_LABEL_CHARS, _PANEL_TITLE_CHARS = 22, 30
-_SETTINGS: dict[Any, Any] = {  # matplotlib types each key, and differently by version
-    "font.family": ["DejaVu Sans"],  # it comes with matplotlib
-    "font.size": 10.0,
-    "text.parse_math": False,  # a name may hold dollars
-    "text.color": _INK_RGB,
-    "axes.edgecolor": _QUIET_RGB,
-    "axes.labelcolor": _INK_RGB,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.spines.left": False,
-    "axes.grid": True,
-    "axes.grid.axis": "x",
-    "axes.axisbelow": True,
-    "grid.color": _GRID_RGB,
-    "xtick.color": _INK_RGB,
-    "ytick.color": _INK_RGB,
-    "ytick.major.size": 0.0,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +63,10 @@ def draw_intervals(
     if not group:
         places, headings = list(range(len(labels))), []
     n_lines = len(labels) + len(headings)
-    with _drawing(table.title, _WIDTH_INCHES, 1.5 + _ROW_INCHES * n_lines) as (figure, stream):
+    with drawing(table.title, _WIDTH_INCHES, 1.5 + _ROW_INCHES * n_lines) as (figure, stream):
         axes = figure.add_subplot()
         axes.set_ylim(n_lines - 0.4, -0.6)
-        axes.set_yticks(places, [_shown(text) for text in labels])
+        axes.set_yticks(places, [shown(text) for text in labels])
         for place, text in headings:
             _heading(axes, place, text)
         _limit(axes, values, papers)
@@ -100,7 +76,7 @@ def draw_intervals(
                 papers, places, "D", fillstyle="none", color=PAPER_RGB, mew=1.6, ms=7,
                 label="paper", zorder=4,
             )  # fmt: skip
-        axes.set_xlabel(_shown(value))
+        axes.set_xlabel(shown(value))
         _legend(figure, axes)
     return stream.getvalue()
 
@@ -126,7 +102,7 @@ def draw_shares(title: str, panels: Sequence[Panel]) -> bytes:
     most = max(len(panel.shares) for panel in panels)
     has_paper = any(share.paper is not None for panel in panels for share in panel.shares)
     height = 1.0 + rows * (0.9 + _ROW_INCHES * most * (1.5 if has_paper else 1.0))
-    with _drawing(title, _WIDTH_INCHES, height) as (figure, stream):
+    with drawing(title, _WIDTH_INCHES, height) as (figure, stream):
         for number, panel in enumerate(panels, 1):
             _draw_panel(figure.add_subplot(rows, columns, number), panel, most)
         _legend(figure, *figure.axes)
@@ -153,12 +129,12 @@ def _draw_panel(axes: "Axes", panel: Panel, most: int) -> None:
             axes.annotate(
                 f"{share:.0%}", (share, at), (4, 0), textcoords="offset points", va="center", size=9
             )
-    axes.set_yticks(list(places), [_shown(s.label, _PANEL_LABEL_CHARS) for s in panel.shares])
+    axes.set_yticks(list(places), [shown(s.label, _PANEL_LABEL_CHARS) for s in panel.shares])
     axes.set_ylim(most - 0.4, -0.6)
     axes.set_xlim(0, 1.12)
     ticks = [0.0, 0.25, 0.5, 0.75, 1.0]
     axes.set_xticks(ticks, [f"{tick:.0%}" for tick in ticks])
-    axes.set_title(_shown(panel.title, _PANEL_TITLE_CHARS), loc="left", size=10.5)
+    axes.set_title(shown(panel.title, _PANEL_TITLE_CHARS), loc="left", size=10.5)
 
 
 def _lines(groups: Sequence[str]) -> tuple[list[int], list[tuple[int, str]]]:
@@ -174,7 +150,7 @@ def _lines(groups: Sequence[str]) -> tuple[list[int], list[tuple[int, str]]]:
 
 def _heading(axes: "Axes", place: int, text: str) -> None:
     axes.annotate(
-        _shown(text), (0, place), (6, 0), xycoords=("axes fraction", "data"),
+        shown(text), (0, place), (6, 0), xycoords=("axes fraction", "data"),
         textcoords="offset points", va="center", weight="bold", size=10,
     )  # fmt: skip
 
@@ -193,13 +169,13 @@ def _draw_ours(axes: "Axes", places: Sequence[int], values: Sequence[Interval]) 
         axes.annotate(
             cell_text(each) if math.isfinite(each.low + each.high) else cell_text(each.mean),
             (1, place), (10, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
-            va="center", size=9, color=_QUIET_RGB, annotation_clip=False,
+            va="center", size=9, color=QUIET_RGB, annotation_clip=False,
         )  # fmt: skip
         if not (math.isnan(each.low) or math.isnan(each.high)):
             ends = (max(each.low, left), min(each.high, right))
             axes.plot(ends, (place, place), "-", color=OURS_RGB, lw=2, solid_capstyle="butt")
     if left < 0:
-        axes.axvline(0, color=_QUIET_RGB, lw=1)
+        axes.axvline(0, color=QUIET_RGB, lw=1)
     means = [each.mean for each in values]
     axes.plot(means, places, "o", color=OURS_RGB, ms=6, label="ours, 95 % interval", zorder=3)
 
@@ -231,46 +207,3 @@ def _column(table: Table, name: str) -> list[Cell]:
         raise WrongInput(f"table {table.name} has no row to draw")
     at = table.columns.index(name)
     return [row[at] for row in table.rows]
-
-
-@contextmanager
-def _drawing(title: str, width: float, height: float) -> Iterator[tuple["Figure", io.BytesIO]]:
-    """A titled figure, in inches, that is written to the stream when the block ends."""
-    with _quiet_matplotlib():
-        import matplotlib as mpl
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        with mpl.rc_context():
-            # The defaults first: a matplotlibrc of the user would show in the figure.
-            mpl.rcdefaults()
-            mpl.rcParams.update(_SETTINGS)
-            figure = Figure((width, height), dpi=_DPI, layout="constrained")
-            FigureCanvasAgg(figure)
-            figure.suptitle(_shown(title, 2 * _LABEL_CHARS), x=0.01, ha="left", weight="bold")
-            stream = io.BytesIO()
-            yield figure, stream
-            figure.savefig(stream, format="png", metadata={"Software": None})
-
-
-@contextmanager
-def _quiet_matplotlib() -> Iterator[None]:
-    """Without its log: of a home folder that cannot be written, of a font cache being made."""
-    logger = logging.getLogger("matplotlib")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        logger.setLevel(level)
-
-
-def _shown(text: str, most: int = _LABEL_CHARS) -> str:
-    """On one line, cut to a length, with a question mark for what the font lacks."""
-    import matplotlib as mpl
-    from matplotlib.ft2font import FT2Font
-
-    font = FT2Font(str(Path(mpl.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")))
-    line = " ".join(text.split())
-    cut = line if len(line) <= most else f"{line[: most - 1]}…"
-    return "".join(char if font.get_char_index(ord(char)) else "?" for char in cut)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from coordinator.export.figures import _drawing, _shown
+from coordinator.export.drawing import drawing, shown
 from survey.doctor.norths import true_headings
 from survey.doctor.track import Track
 
@@ -43,22 +43,22 @@ def draw_track(
     suspects : uris marked red. notes : lines at the bottom.
     """
     red = np.isin(np.array([image.uri for image in track.images]), list(suspects))
-    shown = _in_view(track)
-    west, east, south, north = _window(track.x_m[shown], track.y_m[shown])
+    in_view = _in_view(track)
+    west, east, south, north = _window(track.x_m[in_view], track.y_m[in_view])
     height = _WIDTH_INCHES * (north - south) / (east - west)
     height = min(max(height, _MIN_HEIGHT), _MAX_HEIGHT) + 1.1
-    with _drawing(title, _WIDTH_INCHES, height) as (figure, stream):
+    with drawing(title, _WIDTH_INCHES, height) as (figure, stream):
         axes = figure.add_subplot()
         axes.set_aspect("equal", adjustable="box", anchor="W")
         axes.set_xlim(west, east)
         axes.set_ylim(south, north)
         axes.set_axis_off()
-        lines = "\n".join(_shown(line, _LINE_CHARS) for line in notes)
+        lines = "\n".join(shown(line, _LINE_CHARS) for line in notes)
         figure.supxlabel(lines, x=0.01, ha="left", fontsize=9)
         _lines(axes, track)
         _positions(figure, axes, track, red)
-        _headings(axes, track, shown, max(east - west, north - south))
-        _strays(axes, track, ~shown)
+        _headings(axes, track, in_view, max(east - west, north - south))
+        _strays(axes, track, ~in_view)
         _scale_bar(axes)
         _north_arrow(axes)
         if red.any():
@@ -132,13 +132,13 @@ def _dates(times_s: NDArray[np.float64]) -> list[str]:
     return [moment.strftime("%Y-%m-%d %H:%M:%SZ") for moment in moments]
 
 
-def _headings(axes: "Axes", track: Track, shown: _Mask, side_m: float) -> None:
+def _headings(axes: "Axes", track: Track, in_view: _Mask, side_m: float) -> None:
     """Short strokes from positions to where their cameras look."""
     from matplotlib.collections import LineCollection
 
     headings = np.radians(true_headings(track))
     level = ~(np.abs(track.pitch_deg) > _STEEP_DEG)
-    some = _one_a_cell(track, shown & level & np.isfinite(headings), side_m / _CELLS)
+    some = _one_a_cell(track, in_view & level & np.isfinite(headings), side_m / _CELLS)
     start = np.column_stack([track.x_m[some], track.y_m[some]])
     ahead = np.column_stack([np.sin(headings[some]), np.cos(headings[some])])
     strokes = np.stack([start, start + _TICK_SHARE * side_m * ahead], axis=1)

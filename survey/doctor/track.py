@@ -12,7 +12,7 @@ from contracts.records import Pose, PosedImage
 from geo.crs import ToWgs84
 from geo.frames import LocalMetres
 from geo.magnetic import decimal_years, declination_deg
-from survey.track import sequences, travel_direction_deg
+from survey.track import natural_key, sequences, travel_direction_deg
 
 _NUMBERS = re.compile(r"([0-9]+)")
 _MOST_PATTERNS = 16
@@ -79,7 +79,7 @@ def track_of(images: Sequence[PosedImage], crs: str, allow_ballpark: bool = Fals
     cameras = tuple(sorted(set(labels)))
     number = {label: at for at, label in enumerate(cameras)}
     camera = np.array([number[label] for label in labels], np.int64)
-    by_name = sorted(range(len(posed)), key=lambda at: _name_key(posed[at].uri))
+    by_name = sorted(range(len(posed)), key=lambda at: natural_key(posed[at].uri))
     order = np.lexsort((np.argsort(by_name), times, camera)).astype(np.int64)
     runs = tuple(sequences(posed))
     return Track(
@@ -121,16 +121,11 @@ def camera_labels(images: Sequence[PosedImage]) -> list[str]:
     numbers are taken out (`000123-left.jpg`, `000123-front.jpg`), also in which of these.
     """
     patterns = [_NUMBERS.sub("#", image.uri) for image in images]
-    few = len(set(patterns)) <= min(_MOST_PATTERNS, len(images) // 2)
+    few = 1 < len(set(patterns)) <= min(_MOST_PATTERNS, len(images) // 2)
     return [
         image.camera.name or (pattern if few else image.uri.rpartition("/")[0])
         for image, pattern in zip(images, patterns, strict=True)
     ]
-
-
-def _name_key(uri: str) -> list[str | int]:
-    """Numbers within names count as numbers."""
-    return [int(part) if at % 2 else part for at, part in enumerate(_NUMBERS.split(uri))]
 
 
 def _numbers(pose: Pose | None) -> tuple[float | None, ...]:

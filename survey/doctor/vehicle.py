@@ -40,8 +40,7 @@ def check_vehicle(track: Track) -> Iterator[Finding]:
                 f"{name or 'the camera'} shows the same edges in {still.mean():.0%} of the picture "
                 f"wherever it is, {_where(still)}: parts of the vehicle, or a caption, whose "
                 "keypoints match everywhere",
-                tuple(image.uri for image in samples[name]),
-                "a mask for the camera where the format has one (without --no-masks), or crop",
+                mend="a mask for the camera where the format has one (without --no-masks), or crop",
             )
     if not samples and not any(image.mask_path for image in track.images):
         yield Finding(

@@ -71,7 +71,17 @@ def test_a_damaged_current_never_leaves_the_index(tmp_path: Path, text: str) -> 
         live_generation(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"format_version": 1}'])
+def test_a_former_format_is_to_be_indexed_again(tmp_path: Path) -> None:
+    commit(tmp_path, a_generation())
+    path = tmp_path / "generations" / "000001.json"
+    content = json.loads(path.read_text())
+    content["format_version"] = FORMAT_VERSION - 1
+    path.write_text(json.dumps(content))
+    with pytest.raises(BadIndex, match=f"format version {FORMAT_VERSION - 1}.*again"):
+        live_generation(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"format_version": 2}'])
 def test_a_damaged_generation_names_its_file(tmp_path: Path, text: str) -> None:
     commit(tmp_path, a_generation())
     (tmp_path / "generations" / "000001.json").write_text(text)

@@ -175,7 +175,9 @@ def test_images_without_poses_are_refused_with_the_way_out(tmp_path: Path) -> No
 
 
 def test_an_unknown_format_is_refused_and_the_known_ones_are_named(tmp_path: Path) -> None:
-    with pytest.raises(BadConfig, match="stereopolis, table, exif, plain"):
+    with pytest.raises(
+        BadConfig, match="stereopolis, mcap, kapture, table, utm-names, exif, plain"
+    ):
         read_survey(tmp_path, ReadOptions(format="kitti"))
 
 

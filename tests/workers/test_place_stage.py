@@ -40,10 +40,10 @@ def scores_of(values: list[float]) -> Scores:
     return Scores(array, array > 0)
 
 
-def ranked(best: float) -> tuple[list[Match], Scores]:
-    """A ranking of the ten cameras among many unrelated images, the first of them prominent."""
-    others = np.random.default_rng(1).exponential(size=N_IMAGES - 10)
-    scores = scores_of([best, *np.linspace(0.8, 0.5, 9) * best, *np.minimum(others, 0.4 * best)])
+def ranked(second: float) -> tuple[list[Match], Scores]:
+    """A ranking of the ten cameras among many unrelated images; the first scores 1."""
+    others = np.random.default_rng(1).uniform(0.0, 0.9 * second, N_IMAGES - 10)
+    scores = scores_of([1.0, *np.linspace(second, 0.95 * second, 9), *others])
     return list(rank(scores, 10)), scores
 
 
@@ -117,7 +117,7 @@ def test_a_height_is_known_only_where_the_survey_says_from_what_it_counts(
 def test_an_answer_that_stands_out_is_of_the_survey_and_a_flat_one_is_not(
     rows: list[CatalogueRow], ground: Ground
 ) -> None:
-    clear, flat = (found_in(rows, ground, best) for best in (40.0, 4.0))
+    clear, flat = (found_in(rows, ground, second) for second in (0.3, 0.99))
     sure, unsure = (
         placing_model().certainty(each.evidence, each.distances_m) for each in (clear, flat)
     )
@@ -172,9 +172,9 @@ def facing(
     ]
 
 
-def found_in(rows: list[CatalogueRow], ground: Ground, best: float = 40.0) -> Finding:
+def found_in(rows: list[CatalogueRow], ground: Ground, second: float = 0.3) -> Finding:
     """What the ten rows say together as the first of a ranking."""
-    matches, scores = ranked(best)
+    matches, scores = ranked(second)
     found = find(matches, rows, spots_of(rows, ground), ground, scores)
     assert found is not None
     return found
