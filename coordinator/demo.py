@@ -174,6 +174,7 @@ class _Judge:
             ),
             metres_from_truth=row.flaneur.metres,
             right_facade=row.flaneur.right_facade,
+            estimate=next(iter(located.of_kind("estimate")), None),
         )
 
     def lon_lat(self, query: DemoQuery) -> tuple[float, float]:

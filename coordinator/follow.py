@@ -165,7 +165,6 @@ class Follower:
                 if time.monotonic() > gives_up_at:
                     raise BrokerUnreachable(
                         f"The broker went away and did not come back in {OUTAGE_S:.0f} s "
-                        f"({error}). Run the same command again once it is up: "
-                        "what is done stays done."
+                        f"({error}). Run the same command again once it is up."
                     ) from error
                 time.sleep(0.5)

@@ -67,6 +67,11 @@ class Located:
         return next((str(each["properties"]["error"]) for each in self.of_kind("error")), None)
 
     @property
+    def doubtful(self) -> bool:
+        """Whether the photo may well be of another place."""
+        return any(each["properties"]["in_survey"] is False for each in self.of_kind("estimate"))
+
+    @property
     def not_chosen(self) -> set[str]:
         """How the search was settled where no model chose it: a person should know."""
         choices = {str(each["properties"]["choice"]) for each in self.of_kind("match")}

@@ -17,8 +17,9 @@ class ReadOptions:
 
     crs : coordinate system of a pose table; None: only degrees named lon/lat are taken.
     north : which north headings count from; None: the format's own (each reader states it).
-    no_pose : read the images alone; unless `format` names a reader, poses and metadata are not
-        looked at, so neither are a survey's masks and the way it stores its images.
+    no_pose : read the images alone, in a folder or in MCAP files; unless `format` names a reader,
+        poses and metadata are not looked at, so neither are a survey's masks and the way it
+        stores its images.
     include, exclude : globs on uris (`NAME/` included), see `selector`.
     format : a reader's name; None: recognised by content.
     make_upright, use_masks : whether rotated storage is put upright, vehicle masks applied.

@@ -33,7 +33,7 @@ def choose_reader(path: Path, options: ReadOptions) -> Reader:
     if options.mapping is not None:
         return tables.READER
     if options.no_pose:
-        return plain.READER
+        return mcap.READER if mcap.READER.recognises(path) else plain.READER
     for reader in READERS:
         if reader.recognises(path):
             return reader

@@ -53,7 +53,7 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
         images, uncut = cut_panoramas(reading.images)
         reading = replace(reading, images=images, skipped=reading.skipped + uncut)
     if not reading.images:
-        raise BadSurvey(_why_empty(path, reading.skipped, options))
+        raise BadSurvey(why_empty(path, reading.skipped, options))
     return Survey(
         images=tuple(sorted(map(_named(options), reading.images), key=_uri_bytes)),
         skipped=_ordered(reading.skipped, options),
@@ -122,7 +122,8 @@ def _all_outside(path: Path, first: Pose, crs: str) -> str:
     )
 
 
-def _why_empty(path: Path, skipped: tuple[Skipped, ...], options: ReadOptions) -> str:
+def why_empty(path: Path, skipped: tuple[Skipped, ...], options: ReadOptions) -> str:
+    """What a person is told of a survey without one usable image."""
     if skipped:
         reasons = Counter(skip.reason for skip in skipped)
         reason, count = reasons.most_common(1)[0]

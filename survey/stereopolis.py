@@ -95,7 +95,7 @@ def _require(masks: set[str], listing: Listing, path: Path) -> None:
     if missing:
         raise BadSurvey(
             f"{path / CALIBRATION} names the mask {missing[0]}, which is not in the survey; put "
-            "it there or leave masks unused"
+            "it there or leave masks unused (--no-masks)"
         )
 
 

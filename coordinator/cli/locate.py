@@ -83,6 +83,11 @@ def command(
     if outs:
         located = tally.n_answers - len(tally.failed)
         tell(f"{located} of {tally.n_answers} photos located: {', '.join(map(str, outs))}")
+    if tally.n_doubtful:
+        tell(
+            f"{tally.n_doubtful} of {tally.n_answers} photos may be of another place: nothing in "
+            "this survey stands out as theirs (in_survey: false)."
+        )
     return SOME_SKIPPED if tally.failed else 0
 
 
@@ -90,13 +95,14 @@ class _Tally:
     """What a person is told at the end, noted as the answers go by."""
 
     def __init__(self) -> None:
-        self.n_answers = 0
+        self.n_answers = self.n_doubtful = 0
         self.failed: list[tuple[str, str]] = []
         self.not_chosen: set[str] = set()
 
     def count(self, answers: "Iterable[Located]") -> "Iterator[Located]":
         for answer in answers:
             self.n_answers += 1
+            self.n_doubtful += answer.doubtful
             self.not_chosen |= answer.not_chosen
             if answer.error is not None:
                 self.failed.append((answer.query, answer.error))

@@ -13,17 +13,21 @@ from coordinator.cli import demo, doctor, evaluate, export, index, inspect, loca
 from coordinator.cli.show import complain
 
 FAILED, WRONG_USAGE = 1, 2
+RESUMED = "What is indexed stays so: run the same command again to go on."
 
 
-def _guarded(command: Callable[..., int | None]) -> Callable[..., None]:
-    """A verb whose errors become messages and exit codes, with a traceback only for `--debug`."""
+def _guarded(command: Callable[..., int | None], stopped: str = "") -> Callable[..., None]:
+    """A verb whose errors become messages and exit codes, with a traceback only for `--debug`.
+
+    stopped : what a person should know after Ctrl-C.
+    """
 
     @wraps(command)
     def run(*arguments: object, **options: object) -> None:
         try:
             code = command(*arguments, **options)
         except KeyboardInterrupt:
-            complain("Stopped. What is done stays done: run the same command again to go on.")
+            complain(f"Stopped. {stopped}".rstrip())
             code = FAILED
         except (FlaneurError, OSError) as error:
             if "--debug" in sys.argv:
@@ -58,7 +62,9 @@ main = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (demo, doctor, index, locate, inspect, train, evaluate, worker):
+for verb in (demo, index):
+    main.command(verb.NAME)(_guarded(verb.command, RESUMED))
+for verb in (doctor, locate, inspect, train, evaluate, worker):
     main.command(verb.NAME)(_guarded(verb.command))
 exports = typer.Typer(no_args_is_help=True, help=export.HELP)
 for name, command in export.COMMANDS.items():

@@ -17,6 +17,7 @@ from rich.progress import (
 )
 
 from contracts.records import Skipped
+from coordinator.export.harmless import harmless
 
 MAX_LISTED = 20
 
@@ -26,18 +27,16 @@ stdout = Console(highlight=False)
 
 def complain(message: str) -> None:
     """An error or a warning, for a person."""
-    stderr.print(_harmless(message), style="red", markup=False, soft_wrap=True)
+    stderr.print(_shown(message), style="red", markup=False, soft_wrap=True)
 
 
 def tell(message: str) -> None:
     """A line that is not a result."""
-    stderr.print(_harmless(message), markup=False, soft_wrap=True)
+    stderr.print(_shown(message), markup=False, soft_wrap=True)
 
 
-def _harmless(message: str) -> str:
-    """Without what a file's name could make a terminal do."""
-    shown = (char if char.isprintable() or char == "\n" else "\ufffd" for char in message)
-    return "".join(shown)
+def _shown(message: str) -> str:
+    return "\n".join(map(harmless, message.split("\n")))
 
 
 class Bars:

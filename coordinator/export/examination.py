@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from coordinator.export.files import write_whole
+from coordinator.export.harmless import harmless
 from survey.doctor import COST_MEASURED_ON, Examination, Figures, Finding
 
 _MOST_CAMERAS, _MOST_NAMED = 8, 3
@@ -42,10 +43,7 @@ def as_text(examination: Examination) -> str:
     lines.append(
         ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for name, count in counts.items())
     )
-    # A file's name must not make a terminal do anything.
-    return "\n".join(
-        "".join(char if char.isprintable() else "\ufffd" for char in line) for line in lines
-    )
+    return "\n".join(map(harmless, lines))
 
 
 def write_report(folder: Path, examination: Examination) -> None:

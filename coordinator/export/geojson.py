@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 
+from coordinator.export.attribution import attributions
 from coordinator.export.files import write_pieces
 from geo.geojson import Feature, collection_text
 from index.opened import OpenedIndex
@@ -37,6 +38,7 @@ def encoded(
 def provenance(index: OpenedIndex) -> dict[str, object]:
     """Where results come from, and by which operation their coordinates (`geo.operations`).
 
+    attribution : whose images the surveys are, as each asks to be named.
     accuracy_m : of the operation, as its authority states it; None: not stated.
     """
     about: dict[str, object] = {
@@ -44,6 +46,7 @@ def provenance(index: OpenedIndex) -> dict[str, object]:
         "index": str(index.root.absolute()),
         "generation": index.generation.number,
         "crs": index.generation.crs,
+        "attribution": attributions(index.generation),
     }
     if index.to_wgs84 is None:
         return about

@@ -35,7 +35,10 @@
     return { type: "Feature", properties: {}, geometry: { type: "Polygon", coordinates: [ring] } };
   };
   const radii = (estimates) =>
-    collect(estimates.map((e) => circle(e.geometry.coordinates, e.properties.radius_m)));
+    collect(estimates.flatMap(({ geometry, properties }) =>
+      [properties.radius_95_m, properties.radius_m]
+        .filter((radius) => radius != null)
+        .map((radius) => circle(geometry.coordinates, radius))));
 
   const boxOf = (places) => {
     const box = new maplibregl.LngLatBounds();
@@ -149,9 +152,11 @@
       .filter((feature) => feature.properties.kind === "match" && feature.properties.rank <= 10)
       .sort((a, b) => a.properties.rank - b.properties.rank);
     const estimates = own.filter((feature) => feature.properties.kind === "estimate");
+    const targets = own.filter((feature) => feature.properties.kind === "target");
     const truth = data.truth[i];
     map.getSource("radii").setData(radii(estimates));
-    estimates.forEach((e) => pin(e.geometry.coordinates, "estimate", "", `estimate, within ${e.properties.radius_m} m`));
+    estimates.forEach((e) => pin(e.geometry.coordinates, "estimate", "", `estimate, within ${e.properties.radius_m} m (68 %)`));
+    targets.forEach((t) => pin(t.geometry.coordinates, "target", "★", `what it shows, within ${t.properties.radius_m} m`));
     pinMatches(matches);
     if (truth) pin(truth, "truth", "", "true position");
     const shown = [...own.map((feature) => feature.geometry.coordinates), ...(truth ? [truth] : [])];

@@ -47,6 +47,7 @@ def write_page(
     ValueError : a number of the collection is not finite.
     """
     places = truth or {}
+    targets = any(each["properties"]["kind"] == "target" for each in collection["features"])
     data = {
         "collection": collection,
         "queries": [sheet.query for sheet in sheets],
@@ -59,6 +60,7 @@ def write_page(
         "summary": summary_html(sheets),
         "library_css": _library("maplibre-gl.css"),
         "page_css": own_text("page.css"),
+        "target_key": '<li><i class="key target">★</i>what it shows</li>' if targets else "",
         "truth_key": '<li><i class="key truth"></i>true position</li>' if places else "",
         "sheets": sheets_html(sheets),
         "attribution": html.escape(attribution),

@@ -27,6 +27,8 @@ def refuse_unknown(outs: Sequence[Path]) -> None:
     WrongInput : a name ends in none of `FORMATS`, or is there twice.
     """
     for at, out in enumerate(outs):
+        if out.name == "-":
+            raise WrongInput("--out - is no file; without --out GeoJSON is written on stdout.")
         if out.suffix.lower() not in FORMATS:
             raise WrongInput(
                 f"--out {out}: {_ending(out)} is no format that is "

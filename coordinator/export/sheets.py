@@ -3,12 +3,14 @@
 import base64
 import html
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 
+from geo.geojson import Feature
 from survey import decode_image
 
 BOX_RGB = (255, 196, 46)
@@ -36,6 +38,7 @@ class QuerySheet:
 
     `query` is the path as given, as in the features' property of that name. `style` says what
     kind of picture the photo is. `right_facade` is whether the best match shows the same facade.
+    `estimate` is the feature of its place.
     """
 
     query: str
@@ -46,6 +49,7 @@ class QuerySheet:
     matches: tuple[SheetMatch, ...]
     metres_from_truth: float | None
     right_facade: bool | None
+    estimate: Feature | None = None
 
 
 def thumbnail_jpeg(
@@ -111,7 +115,8 @@ def summary_html(sheets: Sequence[QuerySheet]) -> str:
 
 def _sheet(sheet: QuerySheet) -> str:
     chosen = f"{' + '.join(sheet.detectors)}, k = {sheet.k}"
-    lines = [sheet.style, chosen] if sheet.style else [chosen]
+    certainty = "" if sheet.estimate is None else _certainty(sheet.estimate["properties"])
+    lines = filter(None, [sheet.style, chosen, certainty])
     described = "".join(f"<span>{html.escape(line)}</span>" for line in lines)
     matches = "\n".join(match_html(match) for match in sheet.matches)
     return (
@@ -120,6 +125,16 @@ def _sheet(sheet: QuerySheet) -> str:
         f"<div><h2>{html.escape(sheet.query)}</h2>{described}{_verdict(sheet)}</div></button>\n"
         f'<ol class="matches">\n{matches}\n</ol></article>'
     )
+
+
+def _certainty(estimate: Mapping[str, Any]) -> str:
+    """How sure the place is, in one line."""
+    text = f"within {_metres(estimate['radius_m'])} (68 %)"
+    if estimate["radius_95_m"] is not None:
+        text += f", {_metres(estimate['radius_95_m'])} (95 %)"
+    if estimate["confidence"] is not None:
+        text += f" · confidence {estimate['confidence']:.0%}".replace("%", " %")
+    return text + (" · perhaps of another place" if estimate["in_survey"] is False else "")
 
 
 def _verdict(sheet: QuerySheet) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from contracts.errors import WrongInput
+from coordinator.export.attribution import attributions
 from coordinator.export.stac import JSON_TYPE, STAC_VERSION, ItemMaker, Json
 from geo.bounds import Bounds
 from index.manifest import Generation
@@ -100,7 +101,6 @@ def _collection(
     collection_id: str, generation: Generation, extent: _Extent, groups: list[str]
 ) -> Json:
     surveys = ", ".join(Path(survey.path).name for survey in generation.surveys)
-    attributions = dict.fromkeys(each.attribution for each in generation.surveys)
     collection: Json = {
         "type": "Collection",
         "stac_version": STAC_VERSION,
@@ -118,7 +118,7 @@ def _collection(
             ),
         ],
     }
-    providers = [{"name": each, "roles": ["producer"]} for each in attributions if each]
+    providers = [{"name": each, "roles": ["producer"]} for each in attributions(generation)]
     return {**collection, "providers": providers} if providers else collection
 
 

@@ -5,8 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from contracts.config import North
+from geo.magnetic import FIRST_YEAR, LAST_YEAR
 from survey.doctor.circular import circular_mean, wrapped
-from survey.doctor.findings import Finding
+from survey.doctor.findings import Finding, share, uris_of
 from survey.doctor.mountings import Mounting, mountings
 from survey.doctor.readings import misread_headings
 from survey.doctor.track import Floats, Track
@@ -28,7 +29,10 @@ def check_norths(track: Track) -> Iterator[Finding]:
 
     One camera may be mounted askew by that much: only a rig of three or more earns a warning.
     """
-    if not np.isfinite(track.heading_deg).any() or misread_headings(track) is not None:
+    if not np.isfinite(track.heading_deg).any():
+        return
+    yield from _lost_magnetic(track)
+    if misread_headings(track) is not None:
         return
     corrections = corrections_deg(track)
     steady = [
@@ -62,6 +66,27 @@ def check_norths(track: Track) -> Iterator[Finding]:
             "magnetic against true north cannot be told: the declination is not known without "
             "the images' dates",
         )
+
+
+def _lost_magnetic(track: Track) -> Iterator[Finding]:
+    """Magnetic headings of a place or day whose declination is not known: results have none."""
+    norths = np.array([image.pose.north if image.pose else "" for image in track.images])
+    lost = (
+        (norths == "magnetic")
+        & np.isfinite(track.heading_deg)
+        & ~np.isfinite(track.declination_deg)
+    )
+    if not lost.any():
+        return
+    yield Finding(
+        "north-unknown",
+        "warning",
+        f"{share(int(lost.sum()), len(track))} headings count from magnetic north, and its "
+        f"declination is not known: dates must be {FIRST_YEAR:.0f} to {LAST_YEAR - 1:.0f} and not "
+        "near a magnetic pole; their matches will show no direction",
+        uris_of(track.images, np.flatnonzero(lost)),
+        "times in the survey; or --north true or grid, if they were corrected already",
+    )
 
 
 def true_headings(track: Track) -> Floats:

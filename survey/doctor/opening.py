@@ -1,6 +1,5 @@
 """Read a survey as far as it can be read: what `read_survey` would refuse is examined as well."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from survey.doctor.findings import Finding
 from survey.options import Reader, Reading, ReadOptions, selector
 from survey.poses import crs_name
 from survey.readers import choose_reader
+from survey.reading import why_empty
 
 _BARE_NUMBERS = "EPSG:3857"
 """Any projected system will do to read numbers whose own system is not known."""
@@ -56,10 +56,12 @@ def open_survey(path: Path, options: ReadOptions) -> Opened:
         refusal = Finding("refused", "error", str(error), mend=_mend(error))
         return _opened(path, reader, _bare(reader, path, options), (refusal,), bare=True)
     notes = tuple(Finding("reader", "note", note) for note in reading.notes)
-    if not reading.images and reading.skipped:
+    if not reading.images:
+        refusal = Finding("refused", "error", why_empty(path, reading.skipped, options))
         bare = _bare(reader, path, options)
-        if bare.images:  # only the coordinate system stood in the way
-            return _opened(path, reader, bare, (*notes, _none_usable(reading.skipped)), bare=True)
+        # If there are images now, only the coordinate system stood in the way.
+        found = bare if bare.images else reading
+        return _opened(path, reader, found, (*notes, refusal), bare=True)
     refused = _refused_crs(reading, options)
     return _opened(path, reader, reading, notes + refused, bare=bool(refused))
 
@@ -108,16 +110,6 @@ def _refused_crs(reading: Reading, options: ReadOptions) -> tuple[Finding, ...]:
     except UnknownCrs as error:
         return (Finding("refused", "error", str(error), mend=_mend(error)),)
     return ()
-
-
-def _none_usable(skipped: Sequence[Skipped]) -> Finding:
-    first = skipped[0]
-    return Finding(
-        "refused",
-        "error",
-        f"not one usable image: all {len(skipped):,} were left out; the first, {first.uri}, "
-        f"because: {first.reason}",
-    )
 
 
 def _mend(error: WrongInput) -> str:

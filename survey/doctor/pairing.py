@@ -13,7 +13,13 @@ _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 _MOST_REASONS = 12
 
 _KNOWN = (
-    ("image without pose", "image-without-pose", "add their rows, or --exclude them"),
+    ("names it", "image-without-pose", "add their rows, or --exclude them"),
+    (
+        "apart, more than",
+        "image-without-pose",
+        "--max-gap with more seconds, if the vehicle went evenly; or --exclude them",
+    ),
+    ("image without pose", "image-without-pose", "--exclude them, or give them a pose"),
     ("no GPS position", "image-without-pose", "add a pose table, or --exclude them"),
     ("pose without image", "pose-without-image", "check the folder and the column of file names"),
     ("no image of panorama", "pose-without-image", ""),

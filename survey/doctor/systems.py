@@ -28,6 +28,9 @@ _USUAL = (
 )  # fmt: skip
 """EPSG codes of national and city systems; UTM zones are hinted at by `_utm_hint`."""
 
+_METRIC = frozenset({"mcap", "kapture"})
+"""Formats whose bare numbers are metres, however small."""
+
 _MOST_NAMED = 4
 _WIDEST_NATIONAL_DEG2 = 150.0
 _FEW_NATIONAL, _SOME_NATIONAL = 0, 2
@@ -41,7 +44,7 @@ def check_system(opened: Opened) -> tuple[tuple[PosedImage, ...], list[Finding]]
     x = np.array([image.pose.easting for image in posed if image.pose])
     y = np.array([image.pose.northing for image in posed if image.pose])
     if opened.bare or opened.crs is None:
-        return (), [_unknown_system(x, y)]
+        return (), [_unknown_system(opened, x, y)]
     outside = outside_area([image.pose for image in posed if image.pose], opened.crs)
     inside = tuple(image for image, out in zip(posed, outside, strict=True) if not out)
     if not outside.any():
@@ -83,7 +86,7 @@ def _all_outside(
         f"all {len(x):,} positions lie outside the area of use of {crs} ({_area_name(crs)}), "
         f"swapped or not; the first, {posed[0].uri}, has x {x[0]:.9g}, y {y[0]:.9g}"
     )
-    return _with_suggestion("wrong-crs", what, x, y)
+    return _with_suggestion(opened, what, x, y)
 
 
 _SWAP_COLUMNS = (
@@ -92,18 +95,25 @@ _SWAP_COLUMNS = (
 )
 
 
-def _unknown_system(x: NDArray[np.float64], y: NDArray[np.float64]) -> Finding:
+_NEAR_AN_ORIGIN_M = 10_000.0
+_LOCAL = "bring the poses into a map's system first, or index without positions: --no-pose"
+
+
+def _unknown_system(opened: Opened, x: NDArray[np.float64], y: NDArray[np.float64]) -> Finding:
     what = (
         f"the coordinate system of {len(x):,} positions is not known or not possible; x is "
         f"{x.min():.9g} to {x.max():.9g}, y {y.min():.9g} to {y.max():.9g}"
     )
-    return _with_suggestion("wrong-crs", what, x, y)
+    return _with_suggestion(opened, what, x, y)
 
 
 def _with_suggestion(
-    check: str, what: str, x: NDArray[np.float64], y: NDArray[np.float64]
+    opened: Opened, what: str, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> Finding:
     """What fits the numbers as they are, else swapped, else nothing."""
+    if opened.format in _METRIC and max(np.abs(x).max(), np.abs(y).max()) < _NEAR_AN_ORIGIN_M:
+        what += "; these are metres from an origin of their own, as in no usual coordinate system"
+        return Finding("local-frame", "error", what, mend=_LOCAL)
     middle = float(np.median(x)), float(np.median(y))
     straight, swapped = likely_systems(*middle), likely_systems(middle[1], middle[0])
     for codes, how in ((straight, ""), (swapped, " with x and y swapped")):
@@ -112,9 +122,11 @@ def _with_suggestion(
             more = f" and {len(codes) - _MOST_NAMED} more" if len(codes) > _MOST_NAMED else ""
             what += f"; the numbers fit{how} {names}{more}{_utm_hint(*middle)}"
             mend = f"--crs {codes[0]}, if that is the system the survey was made in"
-            return Finding(check, "error", what, mend=f"{_SWAP_COLUMNS}; {mend}" if how else mend)
+            return Finding(
+                "wrong-crs", "error", what, mend=f"{_SWAP_COLUMNS}; {mend}" if how else mend
+            )
     what += _utm_hint(*middle) or "; no usual coordinate system has such numbers"
-    return Finding(check, "error", what, mend="--crs, with the system the survey was made in")
+    return Finding("wrong-crs", "error", what, mend="--crs, with the system the survey was made in")
 
 
 def _at_sea(x: NDArray[np.float64], y: NDArray[np.float64], crs: str) -> list[Finding]:

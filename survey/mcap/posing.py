@@ -68,7 +68,7 @@ def system(survey: str, drives: Sequence[Recording], options: ReadOptions) -> Sy
     raise BadSurvey(
         f"survey {survey}: no positions; expected LocationFix, NavSatFix, PoseInFrame, Odometry, "
         f"PoseStamped or transforms among its topics: {topics(drives)}. Without positions: "
-        "--no-pose --format mcap"
+        "--no-pose"
     )
 
 

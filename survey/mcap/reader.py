@@ -24,8 +24,10 @@ from survey.options import Reader, Reading, ReadOptions
 
 
 def recognises(path: Path) -> bool:
-    """A file that begins as MCAP does, or a folder with at least one that is named `.mcap`."""
-    return is_mcap(path) if path.is_file() else bool(mcap_files(path)[0])
+    """A file that begins as MCAP does or is named so, or a folder with one that does both."""
+    if path.is_file():
+        return is_mcap(path) or path.suffix.lower() == ".mcap"
+    return bool(mcap_files(path)[0])
 
 
 def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
@@ -38,7 +40,7 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     """
     files, skipped = mcap_files(path)
     if not files:
-        raise BadSurvey(f"{path} is no MCAP file and no folder with one (names end in .mcap)")
+        raise BadSurvey(_why_none(path))
     recordings: dict[str, Recording] = {}
     for name, file in files.items():
         prefix = "" if path.is_file() else f"{name}/"
@@ -61,6 +63,17 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
         bare = [image for drive in found for image in bare_images(drive)]
         return Reading(tuple(bare), tuple(skipped), None, tuple(notes))
     return _posed(path, found, options, skipped, notes)
+
+
+def _why_none(path: Path) -> str:
+    if path.is_dir():
+        return f"survey {path}: no MCAP file in the folder (names end in .mcap)"
+    if not path.stat().st_size:
+        return f"survey {path} is empty (0 bytes); copy or record it again"
+    return (
+        f"survey {path} is no MCAP file: it does not begin as one does. If its beginning was lost, "
+        "copy it again; a file that only lacks its end can be read"
+    )
 
 
 def _posed(

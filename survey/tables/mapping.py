@@ -4,7 +4,7 @@ import codecs
 import tomllib
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 from zoneinfo import ZoneInfo
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
@@ -25,6 +25,9 @@ from survey.tables.convention import (
 )
 from survey.tables.profile import Profile, Role, plain_name
 from survey.tables.text import WHITESPACE, Layout
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "whitespace": WHITESPACE}
 _UNIX = ("iso", "unix_s", "unix_ms", "unix_us", "unix_ns")
@@ -197,9 +200,19 @@ def read_mapping(path: Path) -> TableMapping:
     except OSError as error:
         raise BadConfig(f"mapping {path} cannot be read: {error.strerror}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        raise BadConfig(f"mapping {path}: {where + ': ' if where else ''}{message}") from error
+        problems = "; ".join(_problem(each) for each in error.errors())
+        raise BadConfig(f"mapping {path}: {problems}") from error
     except (ValueError, RecursionError) as error:  # of TOML and of UTF-8
         raise BadConfig(f"mapping {path} is not TOML in UTF-8: {error}") from error
+
+
+def _problem(error: "ErrorDetails") -> str:
+    where = ".".join(str(part) for part in error["loc"])
+    known = {
+        "extra_forbidden": "is no key of a mapping; check its spelling",
+        "missing": "is missing",
+    }
+    if error["type"] in known:
+        return f"{where} {known[error['type']]}"
+    message = error["msg"].removeprefix("Value error, ")
+    return f"{where}: {message}" if where else message

@@ -6,7 +6,7 @@ A further one is a `Profile` more in `PROFILES`. docs/surveys.md says where each
 from collections.abc import Mapping, Sequence
 
 from survey.tables.convention import Convention
-from survey.tables.profile import MATRIX, Profile, Role
+from survey.tables.profile import MATRIX, Profile, Role, plain_name
 
 
 def _named(names: Mapping[Role, str]) -> dict[Role, tuple[str, ...] | int]:
@@ -180,8 +180,14 @@ PROFILES: tuple[Profile, ...] = (
 )
 
 
+_OF_RESULTS = frozenset({"query", "rank", "score"})
+"""Columns of what `flaneur locate` writes, which may lie in the survey's folder."""
+
+
 def recognised(header: Sequence[str], has_position: bool = False) -> Profile | None:
-    """The first profile that a header fits."""
+    """The first profile that a header fits; None for results, which name images as well."""
+    if {plain_name(name) for name in header} >= _OF_RESULTS:
+        return None
     return next((p for p in PROFILES if p.fits(header, has_position)), None)
 
 

@@ -121,8 +121,15 @@ def _layers(path: Path) -> list[_Layer]:
         layers = []
         for name, geometry_type in pyogrio.list_layers(path):
             fields = pyogrio.read_info(path, layer=name)["fields"]
-            layers.append(_Layer(str(name), tuple(map(str, fields)), geometry_type is not None))
+            layers.append(
+                _Layer(str(name), tuple(map(str, fields)), _may_hold_points(geometry_type))
+            )
         return layers
+
+
+def _may_hold_points(geometry_type: str | None) -> bool:
+    """A layer that says of what it is made is taken at its word."""
+    return geometry_type is not None and ("Point" in geometry_type or geometry_type == "Unknown")
 
 
 def _frame(path: Path, layer: _Layer) -> "pandas.DataFrame":

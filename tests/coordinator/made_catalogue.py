@@ -8,7 +8,7 @@ from typing import Any
 
 from contracts.config import IndexConfig
 from coordinator.export.stac import ItemMaker
-from geo.crs import ToWgs84
+from geo.crs import ToWgs84, area_of
 from index.catalogue import CatalogueRow, write_catalogue
 from index.manifest import FileEntry, Generation, SurveyEntry, commit
 from index.opened import OpenedIndex
@@ -60,7 +60,7 @@ def index_of(root: Path, rows: Sequence[CatalogueRow], crs: str | None) -> Opene
         config=IndexConfig(),
         config_digest="",
         crs=crs,
-        area=None if crs is None else (2.0, 48.0, 3.0, 49.0),
+        area=None if crs is None else _area(rows, crs),
         n_images=len(rows),
         n_skipped=0,
         n_postings=0,
@@ -70,6 +70,19 @@ def index_of(root: Path, rows: Sequence[CatalogueRow], crs: str | None) -> Opene
     )
     commit(root, generation)
     return OpenedIndex(root)
+
+
+def _area(rows: Sequence[CatalogueRow], crs: str) -> tuple[float, float, float, float] | None:
+    places = [
+        (row.easting, row.northing)
+        for row in rows
+        if row.easting is not None and row.northing is not None
+    ]
+    if not places:
+        return None
+    area = area_of(crs, *zip(*places, strict=True))
+    assert area is not None
+    return area.west_lon_degree, area.south_lat_degree, area.east_lon_degree, area.north_lat_degree
 
 
 def item(row: CatalogueRow, crs: str | None = "EPSG:2154") -> dict[str, Any]:

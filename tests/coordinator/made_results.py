@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from contracts.config import IndexConfig
+from made_catalogue import index_of
+
 from contracts.records import Camera, Pose, PosedImage
 from coordinator.querying import Located
-from geo.crs import area_of
 from geo.geojson import (
     Feature,
     PlacedEstimate,
@@ -15,8 +15,7 @@ from geo.geojson import (
     estimate_feature,
     match_feature,
 )
-from index.catalogue import catalogue_row, write_catalogue
-from index.manifest import FileEntry, Generation, commit
+from index.catalogue import catalogue_row
 from index.opened import OpenedIndex
 
 MINUTE = "2024-06-12T09:32:16.250+02:00"
@@ -33,36 +32,7 @@ def posed(uri: str, easting: float, northing: float, crs: str = "EPSG:2154") -> 
 def made_index(root: Path, images: Sequence[PosedImage], crs: str | None) -> OpenedIndex:
     """An index that knows these images but can search for none."""
     rows = [catalogue_row(n, "", image, "0" * 64, 640, 480) for n, image in enumerate(images)]
-    catalogue = root / "catalogue" / "0001.parquet"
-    entry = FileEntry(sha256=write_catalogue(catalogue, rows, crs), size=catalogue.stat().st_size)
-    commit(
-        root,
-        Generation(
-            number=1,
-            job="made",
-            created_at="2026-01-01T00:00:00Z",
-            config=IndexConfig(),
-            config_digest="",
-            crs=crs,
-            area=_area(images),
-            n_images=len(images),
-            n_skipped=0,
-            n_postings=0,
-            surveys=(),
-            segment="0001",
-            files={"catalogue/0001.parquet": entry},
-        ),
-    )
-    return OpenedIndex(root)
-
-
-def _area(images: Sequence[PosedImage]) -> tuple[float, float, float, float] | None:
-    poses = [image.pose for image in images if image.pose is not None]
-    if not poses:
-        return None
-    area = area_of(poses[0].crs, [p.easting for p in poses], [p.northing for p in poses])
-    assert area is not None
-    return area.west_lon_degree, area.south_lat_degree, area.east_lon_degree, area.north_lat_degree
+    return index_of(root, rows, crs)
 
 
 def made_match(

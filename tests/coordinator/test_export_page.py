@@ -17,9 +17,11 @@ from geo.geojson import (
     FeatureCollection,
     PlacedEstimate,
     PlacedMatch,
+    PlacedTarget,
     estimate_feature,
     feature_collection,
     match_feature,
+    target_feature,
 )
 
 HOSTILE = 'a"><script>document.title="owned"</script><!--<script>&amp;.jpg'
@@ -50,7 +52,10 @@ def collection(*queries: str) -> FeatureCollection:
     estimates = [
         PlacedEstimate(query, *TRACK[4], 12.0, 3, ("hesaff", "star"), 2) for query in queries
     ]
-    return feature_collection([*features, *map(estimate_feature, estimates)])
+    targets = [PlacedTarget(query, *TRACK[9], 20.0, 3) for query in queries]
+    return feature_collection(
+        [*features, *map(estimate_feature, estimates), *map(target_feature, targets)]
+    )
 
 
 def sheet(query: str, hit: bool | None = None) -> QuerySheet:
@@ -125,6 +130,21 @@ def test_the_summary_counts_firsts_and_takes_the_median_of_metres(tmp_path: Path
     assert "wrong facade" in text
 
 
+@pytest.mark.parametrize("in_survey", [True, False])
+def test_a_sheet_says_how_sure_its_place_is(in_survey: bool, tmp_path: Path) -> None:
+    estimate = estimate_feature(
+        PlacedEstimate(
+            PLAIN, *TRACK[4], 12.0, 3, ("hesaff",), 2,
+            radius_95_m=140.0, confidence=0.72, in_survey=in_survey,
+        )
+    )  # fmt: skip
+    out = tmp_path / "page.html"
+    write_page(out, "t", collection(PLAIN), [replace(sheet(PLAIN), estimate=estimate)])
+    text = out.read_text("utf-8")
+    assert "within 12.0 m (68 %), 140 m (95 %) · confidence 72 %" in text
+    assert ("perhaps of another place" in text) is not in_survey
+
+
 def test_a_file_name_that_is_no_utf_8_can_be_shown(tmp_path: Path) -> None:
     name = b"caf\xe9.jpg".decode("utf-8", "surrogateescape")
     out = tmp_path / "page.html"
@@ -174,6 +194,7 @@ def test_in_a_browser_the_map_is_drawn_without_errors_or_network(tmp_path: Path)
     assert int(drawn.group(1)) >= len(TRACK) / 2
     assert "<title>owned" not in document
     assert re.findall(r'class="pin match[^"]*"|class="[^"]*\bpin match', document)
+    assert 'title="what it shows, within 20 m"' in document
     assert "1·2" in document  # two images of one panorama share a pin
     assert console == []
     assert asked == []

@@ -86,6 +86,11 @@ def test_a_large_batch_is_whole(tmp_path: Path) -> None:
         assert sum('"type":"Feature",' in line for line in lines) == 50_000
 
 
+def test_a_dash_says_how_to_write_on_stdout(tmp_path: Path) -> None:
+    with pytest.raises(WrongInput, match="without --out GeoJSON is written on stdout"):
+        refuse_unknown([tmp_path / "-"])
+
+
 def test_every_output_holds_every_answer(tmp_path: Path) -> None:
     outs = [tmp_path / "a.geojson", tmp_path / "b.json"]
     said: list[str] = []

@@ -182,7 +182,7 @@ def test_fields_have_aliases_and_meanings(index: OpenedIndex, tmp_path: Path) ->
         ).fetchone()
     file.close()
     assert described == ("Heading (°)", "degrees clockwise from true north")
-    assert layers == ("From each estimate to its matches",)
+    assert layers == ("From each estimate to its matches. © A survey",)
 
 
 NAMES = [

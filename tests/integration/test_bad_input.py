@@ -123,7 +123,7 @@ def test_bad_photos_stop_no_other(mixed: tuple[Path, int, dict[str, Any]], tmp_p
         (("--crs", "+proj=utm +zone=31 +ellps=intl"), "no conversion to WGS 84"),
         ((), "--crs EPSG:2154"),
         (("--crs", "EPSG:27700"), "far outside the area of use"),
-        (("--format", "shapefile"), "stereopolis, table, exif, plain"),
+        (("--format", "shapefile"), "stereopolis, mcap, kapture, table, utm-names, exif, plain"),
         ((*SMALL, "--detectors", "hesaff,sift"), "hesaff,mser,star,har,orb,colsym; got 'sift'"),
         ((*SMALL, "--descriptors", "sc,sc"), "names sc twice"),
         ((*SMALL, "--also", "nowhere"), "NAME=SURVEY"),

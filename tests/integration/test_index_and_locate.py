@@ -298,6 +298,7 @@ def test_ctrl_c_keeps_the_answers_so_far_beside_and_nothing_under_the_name(
     assert queries == [str(photo) for photo in photos[: len(queries)]]
     assert 0 < len(queries) < 300
     assert f"The answers to {len(queries)} photos until then are kept" in said
+    assert said.endswith("Stopped.\n")  # it does not go on from there
 
 
 def test_an_output_that_cannot_be_is_refused_before_the_work(

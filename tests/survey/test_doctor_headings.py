@@ -281,3 +281,11 @@ def test_a_circular_mean_turns_with_its_directions(angles: list[float], turn: fl
     still = circular_mean(np.array(angles))
     moved = circular_mean(np.array(angles) + turn)
     assert abs(float(wrapped(np.array([moved - still - turn]))[0])) < 1e-6
+
+
+@pytest.mark.parametrize(("year", "n_lost"), [("2020", 0), ("2005", 240), ("2031", 240)])
+def test_magnetic_headings_of_days_without_a_model_are_told(year: str, n_lost: int) -> None:
+    rows = [{**row, "time": str(row["time"]).replace("2020", year)} for row in good_rows()]
+    lost = [each for each in check_norths(track(rows, north="magnetic"))
+            if each.check == "north-unknown"]  # fmt: skip
+    assert sum(len(each.uris) for each in lost) == n_lost

@@ -17,7 +17,8 @@ from doctored_survey import (
 )
 from PIL import Image, ImageDraw
 
-from survey import ReadOptions
+from contracts.errors import BadSurvey
+from survey import ReadOptions, read_survey
 from survey.doctor import Examination, Finding, examine
 
 LAMBERT = ReadOptions(crs="EPSG:2154")
@@ -231,3 +232,12 @@ def bonnet(file: Path) -> None:
     for x in range(160, 350, 48):
         draw.rectangle((x, 336, x + 20, 368), "white")
     picture.save(file, quality=80)
+
+
+def test_a_folder_without_images_is_refused_as_by_index(tmp_path: Path) -> None:
+    examination = examine(tmp_path, ReadOptions(), NOW)
+    refusal = found(examination, "refused")
+    assert refusal.severity == "error"
+    with pytest.raises(BadSurvey) as refused:
+        read_survey(tmp_path, ReadOptions())
+    assert refusal.what == str(refused.value)

@@ -23,6 +23,7 @@ from mcap_drives import (
 
 from contracts.errors import BadSurvey, UnknownCrs
 from contracts.records import PosedImage
+from survey import read_survey
 from survey.fragments import parse_fragment
 from survey.mcap.payload import image_bytes
 from survey.mcap.reader import READER
@@ -329,9 +330,18 @@ def test_without_poses_images_are_read_alone(dialect, tmp_path):
     dialect.write(tmp_path / "drive.mcap", said)
     with pytest.raises(BadSurvey, match=r"no positions.*/right/image/compressed"):
         read(tmp_path / "drive.mcap")
-    reading = read(tmp_path / "drive.mcap", no_pose=True, format="mcap")
-    assert len(reading.images) == 5
-    assert reading.crs is None
+    for path in (tmp_path / "drive.mcap", tmp_path):
+        survey = read_survey(path, ReadOptions(no_pose=True))
+        assert (len(survey.images), survey.crs, survey.format) == (5, None, "mcap")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"), [(b"", r"empty \(0 bytes\)"), (b"\x00\x01data", "does not begin as one")]
+)
+def test_a_file_that_is_only_named_as_mcap_is_refused_by_what_it_is(content, words, tmp_path):
+    (tmp_path / "x.mcap").write_bytes(content)
+    with pytest.raises(BadSurvey, match=words):
+        read_survey(tmp_path / "x.mcap", ReadOptions())
 
 
 def test_only_images_asked_for_are_read(tmp_path):

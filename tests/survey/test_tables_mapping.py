@@ -171,8 +171,8 @@ def test_a_mapping_chooses_the_table_of_a_folder(tmp_path: Path) -> None:
     ("mapping", "message"),
     [
         (COLUMNS + "speed = 3\n", "columns.speed"),
-        ("colour = 1\n" + COLUMNS, "colour: Extra inputs"),
-        (COLUMNS + '[angles]\nunits = "deg"\n', "angles.units: Extra inputs"),
+        ("colour = 1\n" + COLUMNS, "colour is no key of a mapping"),
+        (COLUMNS + '[angles]\nunits = "deg"\n', "angles.units is no key of a mapping"),
         (COLUMNS + '[angles]\nunit = "mil"\n', "angles.unit: Input should be 'deg'"),
         ("[columns]\nx = 1\ny = 2\n", "columns must name the file"),
         ("header = false\n" + COLUMNS, "without a header has columns by number"),
@@ -184,7 +184,8 @@ def test_a_mapping_chooses_the_table_of_a_folder(tmp_path: Path) -> None:
         (COLUMNS + '[files]\ntemplate = "{file.__class__}"\n', "files.template"),
         (COLUMNS + '[files]\ntemplate = "{camera}/{file}"\n', "columns name no camera"),
         (COLUMNS + "[columns]\n", "is not TOML"),
-        ("", "columns: Field required"),
+        ("", "columns is missing"),
+        ('colums = {file = "file"}\n', "columns is missing; colums is no key of a mapping"),
     ],
 )
 def test_a_mapping_that_makes_no_sense_is_refused_by_key(

@@ -241,3 +241,23 @@ def test_a_text_table_and_a_layer_beside_it_are_refused(tmp_path: Path) -> None:
     (root / "q.geojson").write_text(features([point(2, 48)]))
     with pytest.raises(BadSurvey, match=r"p\.csv, q\.geojson"):
         read_survey(root, L93)
+
+
+def test_results_beside_a_pose_table_are_not_taken_for_one(tmp_path: Path) -> None:
+    root = pictured(tmp_path, "a.jpg")
+    (root / "p.csv").write_text("file,x,y\na.jpg,652000,6862000\n")
+    match = {"query": "photo.jpg", "rank": 1, "score": 3.5, "image": "a.jpg"}
+    feature = {"type": "Feature", "geometry": point(2, 48), "properties": match}
+    results = {"type": "FeatureCollection", "features": [feature]}
+    (root / "results.geojson").write_text(json.dumps(results))
+    assert [image.uri for image in read_survey(root, L93).images] == ["a.jpg"]
+
+
+def test_areas_that_name_a_file_are_not_taken_for_poses(tmp_path: Path) -> None:
+    import geopandas
+
+    root = pictured(tmp_path, "a.jpg")
+    (root / "p.csv").write_text("file,x,y\na.jpg,652000,6862000\n")
+    areas = geopandas.GeoDataFrame({"path": ["a"]}, geometry=[shapely.box(0, 0, 1, 1)])
+    areas.set_crs("EPSG:2154").to_file(root / "areas.gpkg", engine="pyogrio")
+    assert [image.uri for image in read_survey(root, L93).images] == ["a.jpg"]

@@ -20,7 +20,12 @@ _RADII = (
         "radius_95_m", REAL, "Radius 95 % (m)", "metres; the photographer stood within it, 95 %"
     ),
     Column("confidence", REAL, "Confidence", "0 to 1, that the photo was taken in this survey"),
-    Column("in_survey", YES_NO, "In survey", "false: the photo is probably of another place"),
+    Column(
+        "in_survey",
+        YES_NO,
+        "In survey",
+        "false: no likelier to be of this survey than a photo of elsewhere",
+    ),
 )
 _RANKED = (
     Column("rank", INTEGER, "Rank", "1 = best"),

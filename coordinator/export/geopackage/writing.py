@@ -7,6 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyogrio
 
+from coordinator.export.attribution import attributions
 from coordinator.export.batches import in_batches
 from coordinator.export.beside import writing_to, written_beside
 from coordinator.export.columns import GEOMETRY
@@ -37,12 +38,13 @@ def write_geopackage(out: Path, answers: Iterable[Located], index: OpenedIndex) 
     """
     system = layers_system(index)
     thumbnails = Thumbnails()
+    credit = "; ".join(attributions(index.generation))
     written: Counter[str] = Counter()
     with written_beside(out) as part:
         for batch in in_batches(answers):
             for layer, table in layer_tables(batch, index, system, thumbnails):
                 with writing_to(out):
-                    _append(part, layer, table, system, new=layer.name not in written)
+                    _append(part, layer, table, system, None if layer.name in written else credit)
                 written[layer.name] += len(table)
         styles = style_table(LAYERS, n_queries=written["queries"])
         # QGIS makes this table itself when a person stores a style, with these names.
@@ -50,8 +52,11 @@ def write_geopackage(out: Path, answers: Iterable[Located], index: OpenedIndex) 
             pyogrio.write_arrow(styles, part, layer="layer_styles", driver="GPKG", FID="id")
 
 
-def _append(part: Path, layer: Layer, table: pa.Table, system: ToWgs84, *, new: bool) -> None:
-    options = {"DESCRIPTION": layer.description} if new else {}
+def _append(part: Path, layer: Layer, table: pa.Table, system: ToWgs84, credit: str | None) -> None:
+    """Add rows to a layer. credit : of the survey, for a layer that is new; None: it is not."""
+    options = {}
+    if credit is not None:
+        options["DESCRIPTION"] = ". ".join(filter(None, [layer.description, credit]))
     if not part.exists():
         options["VERSION"] = _VERSION
     pyogrio.write_arrow(
@@ -62,6 +67,6 @@ def _append(part: Path, layer: Layer, table: pa.Table, system: ToWgs84, *, new: 
         geometry_name=GEOMETRY,
         geometry_type=layer.geometry_type,
         crs=system_wkt(system),
-        append=not new,
+        append=credit is None,
         **options,
     )
