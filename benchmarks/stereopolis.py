@@ -113,11 +113,15 @@ def second_pass(survey: Path, scratch: Path) -> list[Query]:
 
 
 def index_first_pass(
-    survey: Path, root: Path, options: ReadOptions, engine: Engine
+    survey: Path,
+    root: Path,
+    options: ReadOptions,
+    engine: Engine,
+    config: IndexConfig | None = None,
 ) -> tuple[OpenedIndex, str, str]:
     """Index it; returns images per second and bytes per image too."""
     intake = read_surveys([("", survey)], options)
-    job, plan = make_plan(root, intake, IndexConfig(), DEFAULT_SHARD_SIZE // 4)
+    job, plan = make_plan(root, intake, config or IndexConfig(), DEFAULT_SHARD_SIZE // 4)
     with bars() as progress:
         report = run_job(job, plan, intake, nullcontext(engine), progress)
     n_images = report.generation.n_images

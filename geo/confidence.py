@@ -4,7 +4,9 @@ RECONSTRUCTION; decision 13 has what was measured.
 
 - *Prominence*: how many standard deviations the best score stands above the median of all images,
   over ln n. The best of n unrelated images reaches about ln n where tails are exponential
-  (Gumbel's law of the largest value), so 1 is what photos of other cities get, for any n.
+  (Gumbel's law of the largest value), so 1 is what photos of other cities get, for any n. The more
+  images a word is in, the more chance votes an image's score adds up, and the sooner the tail
+  falls, as a sum's does; a power of the density makes up for it.
 - *Confidence*: a logistic function of it: the probability that the photo is of the survey, when
   as many are as are not.
 - *Radii*: of a photo of the survey the estimate is right, within a street's reach, or it is not;
@@ -26,6 +28,9 @@ from contracts.errors import BadIndex, WrongInput
 
 LEAST_IMAGES = 30
 """A ranking of fewer has no bulk that anything could stand out from."""
+DENSITY, CROWDING = 0.0356, 0.21
+"""Mean share of the images that a word is in, in the towns of the fit; and by which power of it
+the prominence of strangers fell in the same towns with an index of fewer, more crowded words."""
 _NORMAL_95_OF_68 = math.sqrt(math.log(0.05) / math.log(0.32))
 """The radius of 95 % over that of 68 %, of a round two-dimensional normal distribution."""
 
@@ -189,15 +194,18 @@ class PlacingModel(Record):
         )
 
 
-def prominence(z_score: float, n_images: int) -> float | None:
+def prominence(z_score: float, n_images: int, density: float) -> float | None:
     """How far the best answer stands out of a ranking; None below `LEAST_IMAGES`.
 
     Parameters
     ----------
     z_score : (best - median) / standard deviation of the scores of all images of the index.
     n_images : how many they are.
+    density : mean share of the images that a word of the channels searched is in, above 0.
     """
-    return None if n_images < LEAST_IMAGES else z_score / math.log(n_images)
+    if n_images < LEAST_IMAGES:
+        return None
+    return z_score / math.log(n_images) * math.pow(density / DENSITY, CROWDING)
 
 
 def _mixture_quantile(

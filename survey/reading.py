@@ -10,6 +10,7 @@ import numpy as np
 from contracts.errors import BadSurvey
 from contracts.records import Pose, PosedImage, Skipped
 from geo.crs import ToWgs84
+from survey.caveats import caveats
 from survey.options import Reading, ReadOptions, Survey, selector
 from survey.panorama import cut_panoramas
 from survey.poses import crs_name, outside_area
@@ -46,7 +47,7 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
     reading = _only(reading, wanted)
     if reading.crs is not None:
         reading = _inside_area(reading, path)
-        _refuse_unconvertible(reading, options)
+        reading = _with_caveats(reading, options)
         if options.derive_headings:
             reading = _with_headings(reading)
     if options.cut_panoramas:
@@ -63,12 +64,15 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
     )
 
 
-def _refuse_unconvertible(reading: Reading, options: ReadOptions) -> None:
+def _with_caveats(reading: Reading, options: ReadOptions) -> Reading:
     """A conversion that is missing is refused now, not when the first photo is to be placed."""
-    poses = [pose for image in reading.images if (pose := image.pose) is not None]
-    if reading.crs is not None and poses:
-        x, y = [pose.easting for pose in poses], [pose.northing for pose in poses]
-        ToWgs84.over(reading.crs, x, y, options.allow_ballpark)
+    posed = [image for image in reading.images if image.pose is not None]
+    if reading.crs is None or not posed:
+        return reading
+    poses = [pose for image in posed if (pose := image.pose) is not None]
+    x, y = [pose.easting for pose in poses], [pose.northing for pose in poses]
+    place = ToWgs84.over(reading.crs, x, y, options.allow_ballpark)
+    return replace(reading, notes=(*reading.notes, *caveats(posed, place)))
 
 
 def _with_headings(reading: Reading) -> Reading:

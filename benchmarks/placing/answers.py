@@ -18,7 +18,7 @@ from index.opened import OpenedIndex
 from retrieval.fusion import Scores, rank
 from retrieval.score_curves import curve_features
 from workers.stages.choose import choose
-from workers.stages.place import ESTIMATE_FROM, find
+from workers.stages.place import ESTIMATE_FROM, find, searched_density
 from workers.stages.retrieve import Photo, read_photo, search_photo
 from workers.stages.spots import ground_of, spots_of
 
@@ -76,12 +76,14 @@ def standings(index: OpenedIndex, photos: Sequence[Known], kept: Path) -> list[S
 
 
 def _placed(asked: Asked, shot: Shot) -> Placed:
-    scores = _scores(asked.index, read_photo(asked.index, str(shot.path)))
+    scores, density = _scores(asked.index, read_photo(asked.index, str(shot.path)))
     matches = rank(scores, ESTIMATE_FROM)
     rows = asked.index.catalogue.rows([match.image_id for match in matches])
     ground = ground_of(asked.index)
     finding = (
-        None if ground is None else find(matches, rows, spots_of(rows, ground), ground, scores)
+        None
+        if ground is None
+        else find(matches, rows, spots_of(rows, ground), ground, scores, density)
     )
     if finding is None:
         raise ValueError(f"{shot.path} has no match with a pose in {asked.index.root}")
@@ -101,29 +103,32 @@ def _placed(asked: Asked, shot: Shot) -> Placed:
 
 
 def _standing(index: OpenedIndex, photo: Known) -> Standing:
-    scores = _scores(index, read_photo(index, str(photo.path)))
+    scores, density = _scores(index, read_photo(index, str(photo.path)))
     others = np.setdiff1d(np.arange(index.n_images), sorted(photo.relevant))
     best = rank(scores, 1)
     return Standing(
         set=photo.set,
         found=bool(best) and best[0].image_id in photo.relevant,
-        with_place=_prominence(scores),
-        without_place=_prominence(_of(scores, others)),
+        with_place=_prominence(scores, density),
+        without_place=_prominence(_of(scores, others), density),
     )
 
 
-def _scores(index: OpenedIndex, photo: Photo) -> Scores:
+def _scores(index: OpenedIndex, photo: Photo) -> tuple[Scores, float]:
+    """Of all images, and the density of the channels that were searched."""
     search = SearchConfig()
-    return search_photo(index, photo, choose(index, photo, search), search)
+    chosen = choose(index, photo, search)
+    scores = search_photo(index, photo, chosen, search)
+    return scores, searched_density(index, chosen)
 
 
 def _of(scores: Scores, images: NDArray[np.int64]) -> Scores:
     return Scores(scores.values[images], scores.touched[images])
 
 
-def _prominence(scores: Scores) -> float:
+def _prominence(scores: Scores, density: float) -> float:
     n_images = len(scores.values)
-    found = prominence(curve_features(scores, n_images).z_score, n_images)
+    found = prominence(curve_features(scores, n_images).z_score, n_images, density)
     if found is None:
         raise ValueError(f"{n_images} images are too few to tell what stands out of them")
     return found

@@ -16,6 +16,8 @@ import numpy as np
 from benchmarks.sets.collections import SEEDS, rehearsed_sets
 from benchmarks.sets.run import OUT as SETS
 from benchmarks.stereopolis import FIRST_PASS, index_first_pass, second_pass
+from contracts.config import IndexConfig
+from coordinator.demo import CONFIG as DEMO_CONFIG
 from coordinator.engine import Engine
 from geo.crs import ToWgs84
 from index.opened import OpenedIndex
@@ -62,20 +64,26 @@ class Known:
 
 
 def towns(folder: Path, engine: Engine) -> Iterator[Asked]:
-    """Every town with its own photos, and with those of the other towns."""
+    """Every town with its own photos, and with those of the other towns.
+
+    Indexed as `flaneur index` does by default, and as the demo does, with fewer, more crowded
+    words.
+    """
     for seed in SEEDS:
         _render(folder / f"town-{seed}", seed)
     own = {seed: _photos(folder / f"town-{seed}", seed) for seed in SEEDS}
-    for seed in SEEDS:
-        root = folder / f"town-{seed}" / "index"
-        index = _indexed(folder / f"town-{seed}" / "survey", root, ReadOptions(crs=_CRS), engine)
-        others = (
-            replace(shot, place=None, looks_at=None)
-            for other in SEEDS
-            for shot in own[other]
-            if other != seed
-        )
-        yield Asked(f"town {seed}", index, (*own[seed], *others))
+    for suffix, config in (("", IndexConfig()), (" crowded", DEMO_CONFIG)):
+        for seed in SEEDS:
+            town = folder / f"town-{seed}"
+            root = town / f"index{suffix.replace(' ', '-')}"
+            index = _indexed(town / "survey", root, ReadOptions(crs=_CRS), engine, config)
+            others = (
+                replace(shot, place=None, looks_at=None)
+                for other in SEEDS
+                for shot in own[other]
+                if other != seed
+            )
+            yield Asked(f"town {seed}{suffix}", index, (*own[seed], *others))
 
 
 def stereopolis(data: Path, folder: Path, engine: Engine) -> Iterator[Asked]:
@@ -144,9 +152,15 @@ def _photos(folder: Path, seed: int) -> list[Shot]:
     ]
 
 
-def _indexed(survey: Path, root: Path, options: ReadOptions, engine: Engine) -> OpenedIndex:
+def _indexed(
+    survey: Path,
+    root: Path,
+    options: ReadOptions,
+    engine: Engine,
+    config: IndexConfig | None = None,
+) -> OpenedIndex:
     if not (root / "CURRENT").is_file():
-        index_first_pass(survey, root, options, engine)
+        index_first_pass(survey, root, options, engine, config)
     return OpenedIndex(root)
 
 

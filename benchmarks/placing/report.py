@@ -23,7 +23,7 @@ _STYLES = ("--", "-.", ":")
 
 def print_coverage(tests: Sequence[Tested]) -> None:
     """How often the truth lies inside the radii, of each test and of all towns together."""
-    towns = [test for test in tests if test[0].startswith("town")]
+    towns = [test for test in tests if test[0].removeprefix("town ").isdigit()]
     rows = [_coverage(test[0], [test]) for test in tests]
     rows.insert(len(towns), _coverage("all towns", towns))
     header = ("photos of", "n", "inside 68 %", "inside 95 %")

@@ -11,6 +11,7 @@ from coordinator.cli.lists import SOME_SKIPPED
 from coordinator.cli.outputs import result_file, utf_8
 from coordinator.cli.show import bars, list_skipped, tell
 from coordinator.cli.survey_options import (
+    AllowBallpark,
     Crs,
     Exclude,
     Format,
@@ -37,6 +38,7 @@ def mcap(
     survey_format: Format = None,
     mapping: Mapping = None,
     max_gap: MaxGap = 1.0,
+    allow_ballpark: AllowBallpark = False,
 ) -> int:
     """A survey as one MCAP file: images, places and attitudes, for Foxglove and ROS 2."""
     from coordinator.export.mcap import write_mcap
@@ -54,12 +56,16 @@ def mcap(
         # What the survey itself says, nothing made of it: whole panoramas, measured headings.
         cut_panoramas=False,
         derive_headings=False,
+        use_masks=False,  # MCAP has no place for them
+        allow_ballpark=allow_ballpark,
     )
     out = result_file(out, (survey,))
     found = read_survey(survey.absolute(), options)
+    for note in found.notes:
+        tell(note)
     with bars() as progress:
         progress.begin("mcap", len(found.images), 0)
-        written = write_mcap(found, out, lambda: progress.advance("mcap"))
+        written = write_mcap(found, out, lambda: progress.advance("mcap"), allow_ballpark)
     skipped = (*found.skipped, *written.skipped)
     list_skipped(skipped, "the survey")
     tell(f"{written.n_images} of {len(found.images) + len(found.skipped)} images: {out}")

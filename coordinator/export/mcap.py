@@ -52,7 +52,9 @@ class Export:
     skipped: tuple[Skipped, ...]
 
 
-def write_mcap(survey: Survey, out: Path, advance: Callable[[], None]) -> Export:
+def write_mcap(
+    survey: Survey, out: Path, advance: Callable[[], None], allow_ballpark: bool = False
+) -> Export:
     """Write the whole survey, in order of time, one image in memory at a time.
 
     JPEG, PNG and WebP files go in byte for byte, with what their EXIF says. Anything else, views
@@ -65,7 +67,7 @@ def write_mcap(survey: Survey, out: Path, advance: Callable[[], None]) -> Export
 
     Parameters
     ----------
-    advance : called once an image.
+    advance : called once an image. allow_ballpark : see `geo.crs.ToWgs84`.
 
     Raises
     ------
@@ -73,7 +75,7 @@ def write_mcap(survey: Survey, out: Path, advance: Callable[[], None]) -> Export
     """
     frames = _frames(survey.images)
     times_ns = _times_ns(survey.images)
-    places = in_wgs84(survey)
+    places = in_wgs84(survey, allow_ballpark)
     skipped: list[Skipped] = []
     with (
         written_beside(out) as part,

@@ -28,8 +28,10 @@ class Place:
     quaternion: Floats
 
 
-def in_wgs84(survey: Survey) -> list[Place | None]:
+def in_wgs84(survey: Survey, allow_ballpark: bool = False) -> list[Place | None]:
     """The place of each image, None where it has no pose. Derived headings are left out.
+
+    allow_ballpark : see `geo.crs.ToWgs84`.
 
     Raises
     ------
@@ -43,7 +45,7 @@ def in_wgs84(survey: Survey) -> list[Place | None]:
     easting = np.array([pose.easting for pose in poses])
     northing = np.array([pose.northing for pose in poses])
     altitude = np.array([_or_nan(pose.altitude_m) for pose in poses])
-    to_wgs84 = ToWgs84.over(survey.crs, easting, northing)
+    to_wgs84 = ToWgs84.over(survey.crs, easting, northing, allow_ballpark)
     lon, lat, height = to_wgs84.positions(easting, northing, altitude)
     convergence = to_wgs84.convergence_deg(easting, northing)
     years = decimal_years([survey.images[at].captured_at for at in posed])

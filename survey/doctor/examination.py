@@ -29,7 +29,6 @@ CHECKS_OF_TRACK = (
     check_headings,
     check_norths,
     check_angles,
-    check_heights,
     check_clock,
     check_poses_twice,
     check_spacing,
@@ -93,3 +92,4 @@ def _of_track(track: Track | None, opened: Opened, options: ReadOptions) -> Iter
         return
     for check in CHECKS_OF_TRACK:
         yield from check(track)
+    yield from check_heights(track, opened.format)

@@ -4,16 +4,26 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from geo.crs import parse_crs, parse_full_crs
+from geo.heights import vertical_reference
 from survey.doctor.findings import Finding, share, uris_of
 from survey.doctor.track import Track
 
 _LOWEST_STREET_M = -30.0
 """Below what streets there are but for the shores of the Dead Sea and a few tunnels."""
 _JUMP_M, _STEEPEST = 10.0, 0.5
+_FIXED = frozenset({"exif", "stereopolis"})
+"""Formats whose system no option changes."""
+_ELLIPSOIDAL = "--crs EPSG:4979, if these are degrees and heights of WGS 84, as receivers give them"
+_NGF_WEST_DEG, _NGF_EAST_DEG, _NGF_SOUTH_DEG = -4.87, 8.23, 42.33
+"""Where heights of mainland France (EPSG:5720) are used; Corsica has its own."""
 
 
-def check_heights(track: Track) -> Iterator[Finding]:
-    """Missing, constant, below the sea, jumping, or counted from an unknown zero."""
+def check_heights(track: Track, survey_format: str) -> Iterator[Finding]:
+    """Missing, constant, below the sea, jumping, or counted from an unknown zero.
+
+    survey_format : the reader's name.
+    """
     known = np.isfinite(track.altitude_m)
     if not known.any():
         yield Finding("height", "note", "no image has a height: results carry none")
@@ -45,10 +55,10 @@ def check_heights(track: Track) -> Iterator[Finding]:
             f"{share(len(low), len(track))} heights are below {_LOWEST_STREET_M:g} m, the lowest "
             f"{heights.min():.0f} m: few streets are; heights above the ellipsoid or of depth?",
             uris_of(track.images, low),
-            "--crs with the heights' own system, such as --crs EPSG:4979 for ellipsoidal ones",
+            _system_with_heights(track, survey_format),
         )
     yield from _jumps(track)
-    yield from _unknown_zero(track)
+    yield from _unknown_zero(track, survey_format)
 
 
 def _jumps(track: Track) -> Iterator[Finding]:
@@ -69,14 +79,35 @@ def _jumps(track: Track) -> Iterator[Finding]:
         )
 
 
-def _unknown_zero(track: Track) -> Iterator[Finding]:
-    heights = track.place.heights
-    if heights.why_not:
+def _unknown_zero(track: Track, survey_format: str) -> Iterator[Finding]:
+    heights, full = track.place.heights, parse_full_crs(track.place.crs_text)
+    if vertical_reference(full) is None:
+        yield Finding(
+            "height-datum",
+            "note",
+            f"results carry no heights: {full.name} does not say from what altitudes count",
+            mend=_system_with_heights(track, survey_format),
+        )
+    elif heights.why_not:
         yield Finding(
             "height-datum",
             "note",
             f"results carry no heights: {heights.why_not}",
-            mend=f"pyproj sync --file {heights.missing_grids[0]}"
-            if heights.missing_grids
-            else "--crs with both, such as EPSG:2154+5720 (France, above the sea)",
+            mend=f"pyproj sync --file {heights.missing_grids[0]}" if heights.missing_grids else "",
         )
+
+
+def _system_with_heights(track: Track, survey_format: str) -> str:
+    """What to give as --crs so that altitudes count from something, "" where nothing can be."""
+    crs = parse_crs(track.place.crs_text)
+    if survey_format in _FIXED or (survey_format == "mcap" and crs.is_geographic):
+        return ""
+    if crs.is_geographic:
+        return _ELLIPSOIDAL
+    lon, lat = float(np.median(track.lon_deg)), float(np.median(track.lat_deg))
+    french = crs.area_of_use is not None and crs.area_of_use.name.startswith("France")
+    mainland = _NGF_WEST_DEG < lon < _NGF_EAST_DEG and lat > _NGF_SOUTH_DEG
+    code = ":".join(crs.to_authority(min_confidence=100) or ())
+    if french and mainland and code:
+        return f"--crs {code}+5720, if heights count from the sea (NGF-IGN69)"
+    return "--crs with the heights' system joined to the survey's: EPSG:<survey's>+<heights'>"

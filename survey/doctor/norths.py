@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from contracts.config import North
-from geo.magnetic import FIRST_YEAR, LAST_YEAR
+from survey.caveats import WHY_NO_DECLINATION, without_declination
 from survey.doctor.circular import circular_mean, wrapped
 from survey.doctor.findings import Finding, share, uris_of
 from survey.doctor.mountings import Mounting, mountings
@@ -70,20 +70,14 @@ def check_norths(track: Track) -> Iterator[Finding]:
 
 def _lost_magnetic(track: Track) -> Iterator[Finding]:
     """Magnetic headings of a place or day whose declination is not known: results have none."""
-    norths = np.array([image.pose.north if image.pose else "" for image in track.images])
-    lost = (
-        (norths == "magnetic")
-        & np.isfinite(track.heading_deg)
-        & ~np.isfinite(track.declination_deg)
-    )
+    lost = without_declination(track.images, track.declination_deg)
     if not lost.any():
         return
     yield Finding(
         "north-unknown",
         "warning",
-        f"{share(int(lost.sum()), len(track))} headings count from magnetic north, and its "
-        f"declination is not known: dates must be {FIRST_YEAR:.0f} to {LAST_YEAR - 1:.0f} and not "
-        "near a magnetic pole; their matches will show no direction",
+        f"{share(int(lost.sum()), len(track))} headings count from magnetic north, and "
+        f"{WHY_NO_DECLINATION}",
         uris_of(track.images, np.flatnonzero(lost)),
         "times in the survey; or --north true or grid, if they were corrected already",
     )

@@ -91,13 +91,13 @@ def _grey(image: PosedImage) -> NDArray[np.float32] | None:
 
 
 def _moving_without_mask(track: Track, camera: int) -> list[PosedImage]:
-    """One image a place, for at a red light all pictures are one. None of a sky camera."""
+    """One image a square metre, for at a red light all are one. None of a sky camera."""
     members = track.order[track.camera[track.order] == camera]
     if not looks_level(track.pitch_deg[members]):
         return []
-    steps = np.hypot(np.diff(track.x_m[members]), np.diff(track.y_m[members]))
-    moved = members[np.concatenate([[True], steps > 1.0])]
-    images = [track.images[at] for at in moved]
+    cells = np.floor(np.column_stack([track.x_m[members], track.y_m[members]]))
+    first_of_cell = np.unique(cells, axis=0, return_index=True)[1]
+    images = [track.images[at] for at in members[np.sort(first_of_cell)]]
     return [image for image in images if image.mask_path is None]
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from contracts.errors import BadIndex, WrongInput
-from geo.confidence import Evidence, PlacingModel, TrainingSet, prominence
+from geo.confidence import CROWDING, DENSITY, Evidence, PlacingModel, TrainingSet, prominence
 
 MODEL = PlacingModel(
     present=(-6.0, 5.0),
@@ -90,7 +90,7 @@ def test_below_the_least_confidence_a_photo_is_not_of_the_survey() -> None:
 
 
 def test_a_survey_too_small_to_tell_gives_no_verdict_and_wide_radii() -> None:
-    assert prominence(3.0, 29) is None
+    assert prominence(3.0, 29, DENSITY) is None
     found = MODEL.certainty(Evidence(None, 1.0), [5.0])
     assert (found.confidence, found.in_survey) == (None, None)
     assert found.radius_68_m == MODEL.certainty(Evidence(0.8, 1.0), [5.0]).radius_68_m
@@ -112,10 +112,17 @@ def test_the_best_of_many_unrelated_images_has_a_prominence_of_one(n_images: int
     found = []
     for _ in range(25):
         scores = rng.exponential(size=n_images)
-        best = prominence(float((scores.max() - np.median(scores)) / scores.std()), n_images)
+        z_score = float((scores.max() - np.median(scores)) / scores.std())
+        best = prominence(z_score, n_images, DENSITY)
         assert best is not None
         found.append(best)
     assert np.median(found) == pytest.approx(1.0, abs=0.13)
+
+
+def test_among_crowded_words_the_same_height_stands_out_more() -> None:
+    thin, crowded = (prominence(6.0, 200, density) for density in (DENSITY, 3.0 * DENSITY))
+    assert thin is not None
+    assert crowded == pytest.approx(thin * 3.0**CROWDING)
 
 
 @pytest.mark.parametrize("away_m", [[], [-1.0], [math.nan], [1.0, math.inf]])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from contracts.records import Match
+from geo.confidence import DENSITY
 from geo.crs import ToWgs84
 from geo.frames import LocalMetres
 from geo.magnetic import declination_deg
@@ -175,6 +176,6 @@ def facing(
 def found_in(rows: list[CatalogueRow], ground: Ground, second: float = 0.3) -> Finding:
     """What the ten rows say together as the first of a ranking."""
     matches, scores = ranked(second)
-    found = find(matches, rows, spots_of(rows, ground), ground, scores)
+    found = find(matches, rows, spots_of(rows, ground), ground, scores, DENSITY)
     assert found is not None
     return found

@@ -71,10 +71,19 @@ def place(
         match_feature(_placed(index, query, chosen, match, row, spots, at))
         for at, (match, row) in enumerate(zip(matches[:top], rows, strict=False))
     ]
-    finding = None if ground is None else find(matches, rows, spots, ground, scores)
+    if ground is None:
+        return features
+    density = searched_density(index, chosen)
+    finding = find(matches, rows, spots, ground, scores, density)
     if finding is None:
         return features
     return [*features, *_found(query, chosen, finding)]
+
+
+def searched_density(index: OpenedIndex, chosen: Chosen) -> float:
+    """Mean share of the images that a word of the chosen detectors is in."""
+    descriptors = index.config.features.descriptors
+    return index.density([f"{det}-{desc}" for det in chosen.detectors for desc in descriptors])
 
 
 def find(
@@ -83,12 +92,14 @@ def find(
     spots: Spots,
     ground: Ground,
     scores: Scores,
+    density: float,
 ) -> Finding | None:
     """What the first matches say together; None where none of them has a place.
 
     Parameters
     ----------
     matches, rows, spots : of the first of the ranking, in one order.
+    density : mean share of the images that a word of the channels searched is in.
     """
     first = slice(0, ESTIMATE_FROM)
     lon, lat = spots.lon_deg[first], spots.lat_deg[first]
@@ -97,7 +108,7 @@ def find(
     if found is None:
         return None
     n_images = len(scores.values)
-    standing = prominence(curve_features(scores, n_images).z_score, n_images)
+    standing = prominence(curve_features(scores, n_images).z_score, n_images, density)
     measured = [not row.heading_derived for row in rows[first]]
     hfov = [np.nan if row.hfov_deg is None else row.hfov_deg for row in rows[first]]
     x_m, y_m = LocalMetres(found.lon_deg, found.lat_deg).from_lon_lat(
