@@ -88,11 +88,19 @@ def print_with_and_without(standings: Sequence[Standing], model: PlacingModel) -
 
 
 def print_targets(tests: Sequence[Tested]) -> None:
-    """How often a target is given, and how far it is from the middle of the wall it should be."""
+    """How often a target is given, and how far it is from the middle of the wall it should be.
+
+    As in results, only to photos that are said to be of the survey.
+    """
     rows = []
-    for name, answers, _ in tests:
+    for name, answers, model in tests:
         own = _of_survey(answers)
-        given = [answer for answer in own if answer.target_radius_m is not None]
+        said_in = _said_in(own, model)
+        given = [
+            answer
+            for answer, is_in in zip(own, said_in, strict=True)
+            if is_in and answer.target_radius_m is not None
+        ]
         known = [answer for answer in given if answer.target_error_m is not None]
         errors = np.array([answer.target_error_m for answer in known], dtype=np.float64)
         radii = np.array([answer.target_radius_m for answer in known], dtype=np.float64)

@@ -15,7 +15,7 @@ from index.catalogue import CatalogueRow
 from index.models import placing_model
 from index.opened import OpenedIndex
 from retrieval.fusion import Scores, rank
-from workers.stages.place import Finding, find, place
+from workers.stages.place import Finding, find, finding_features, place
 from workers.stages.retrieve import Chosen
 from workers.stages.spots import Ground, ground_of, spots_of
 
@@ -137,6 +137,16 @@ def test_what_cameras_around_a_square_see_is_the_target(
     )
     assert np.hypot(*off)[0] < 0.5
     assert found.target.support == 10
+
+
+def test_a_photo_of_elsewhere_gets_no_target(rows: list[CatalogueRow], ground: Ground) -> None:
+    around = facing(rows, (652100.0, 6862100.0), derived=False)
+    clear, flat = (
+        finding_features("q.jpg", CHOSEN, found_in(around, ground, second))
+        for second in (0.3, 0.99)
+    )
+    assert kinds(clear) == ["estimate", "target"]
+    assert kinds(flat) == ["estimate"]
 
 
 def test_a_heading_derived_from_the_track_is_no_line_of_sight(

@@ -77,7 +77,7 @@ def place(
     finding = find(matches, rows, spots, ground, scores, density)
     if finding is None:
         return features
-    return [*features, *_found(query, chosen, finding)]
+    return [*features, *finding_features(query, chosen, finding)]
 
 
 def searched_density(index: OpenedIndex, chosen: Chosen) -> float:
@@ -126,7 +126,7 @@ def find(
     )
 
 
-def _found(query: str, chosen: Chosen, finding: Finding) -> list[Feature]:
+def finding_features(query: str, chosen: Chosen, finding: Finding) -> list[Feature]:
     """The estimate, with how sure it is, and the target."""
     certainty = placing_model().certainty(
         finding.evidence, finding.distances_m, finding.position_error_m
@@ -147,7 +147,7 @@ def _found(query: str, chosen: Chosen, finding: Finding) -> list[Feature]:
         )
     )
     target = finding.target
-    if target is None:
+    if target is None or certainty.in_survey is False:  # strangers' rays cross by chance
         return [estimate]
     placed = PlacedTarget(query, target.lon_deg, target.lat_deg, target.radius_m, target.support)
     return [estimate, target_feature(placed)]
