@@ -99,22 +99,8 @@ def _in_crs(named: NamedSurvey, crs: str, allow_ballpark: bool) -> NamedSurvey:
     images = list(survey.images)
     for row, pose in zip(posed, found.poses, strict=True):
         images[row] = replace(images[row], pose=pose)
-    notes = [
-        f"{named.name}: converted from {former} into {crs} by {operation.name} "
-        f"({_accuracy(operation.accuracy_m)})"
-        for former, operation in found.operations.items()
-    ]
-    if found.altitudes_dropped:
-        notes.append(
-            f"{named.name}: {found.altitudes_dropped} altitudes dropped, which count from "
-            f"something else than those of {crs}"
-        )
-    survey = replace(survey, images=tuple(images), crs=crs, notes=(*survey.notes, *notes))
-    return replace(named, survey=survey)
-
-
-def _accuracy(metres: float | None) -> str:
-    return "of unknown accuracy" if metres is None else f"to {metres:g} m"
+    notes = (*survey.notes, *found.told(named.name))
+    return replace(named, survey=replace(survey, images=tuple(images), crs=crs, notes=notes))
 
 
 def _renamed(options: ReadOptions, name: str) -> ReadOptions:

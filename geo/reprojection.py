@@ -18,13 +18,29 @@ from geo.operations import Operation, best_converter, joined, missing_grids
 class Reprojected:
     """Poses in one system.
 
-    poses : in the order they were given. operations : how each other system was converted, by its
-    text. altitudes_dropped : of how many poses the altitude counts from something else.
+    poses : in the order they were given. crs : theirs. operations : how each other system was
+    converted, by its text. altitudes_dropped : of how many poses the altitude counts from
+    something else.
     """
 
     poses: tuple[Pose, ...]
+    crs: str
     operations: dict[str, Operation]
     altitudes_dropped: int
+
+    def told(self, what: str) -> tuple[str, ...]:
+        """What a person should know of the conversion of `what`, a sentence each."""
+        sentences = [
+            f"{what}: converted from {former} into {self.crs} by {operation.name} "
+            f"({_accuracy(operation.accuracy_m)})"
+            for former, operation in self.operations.items()
+        ]
+        if self.altitudes_dropped:
+            sentences.append(
+                f"{what}: {self.altitudes_dropped} altitudes dropped, which count from something "
+                f"else than those of {self.crs}"
+            )
+        return tuple(sentences)
 
 
 def reproject(poses: Sequence[Pose], crs: str, allow_ballpark: bool = False) -> Reprojected:
@@ -55,7 +71,11 @@ def reproject(poses: Sequence[Pose], crs: str, allow_ballpark: bool = False) -> 
         for row, pose in zip(rows, moved, strict=True):
             dropped += pose.altitude_m is None and poses[row].altitude_m is not None
             found[row] = pose
-    return Reprojected(tuple(found), operations, dropped)
+    return Reprojected(tuple(found), crs, operations, dropped)
+
+
+def _accuracy(metres: float | None) -> str:
+    return "of unknown accuracy" if metres is None else f"to {metres:g} m"
 
 
 def _converted(

@@ -1,4 +1,4 @@
-"""What becomes of positions and headings on their way to WGS 84 and true north, if it is not good."""
+"""What a person should know of how positions and headings reach WGS 84 and true north."""
 
 from collections.abc import Iterator, Sequence
 
@@ -32,9 +32,7 @@ def caveats(images: Sequence[PosedImage], place: ToWgs84) -> Iterator[str]:
     magnetic = [image for image in images if image.pose and image.pose.north == "magnetic"]
     lost = int(without_declination(magnetic, _declination_deg(magnetic, place)).sum())
     if lost:
-        yield (
-            f"{lost:,} magnetic headings cannot be turned to true north: {WHY_NO_DECLINATION}"
-        )
+        yield (f"{lost:,} magnetic headings cannot be turned to true north: {WHY_NO_DECLINATION}")
 
 
 def without_declination(

@@ -19,9 +19,11 @@ from contracts.records import Camera, Pose, PosedImage, Skipped
 from survey.equirectangular import PanoramaArea
 from survey.files import list_images
 from survey.image_header import ImageHeader, read_header
+from survey.mcap.listing import mcap_files
 from survey.options import Reader, Reading, ReadOptions
 from survey.panorama import panorama_area
 from survey.poses import normalised, on_null_island, pose_problem
+from survey.tables.reader import untaken_tables
 from survey.times import zoned_time
 from survey.xmp import stated_angles
 
@@ -75,13 +77,18 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
         raise BadSurvey(
             f"{path}: none of its {without} images has a pose: no Stereopolis metadata, no pose "
             "table (CSV with a file column and coordinates), no GPS in EXIF. Add a pose table, "
-            "or index without positions: --no-pose"
+            "or index without positions: --no-pose" + untaken_tables(path) + _untaken_mcap(path)
         )
     crs = CRS_WITH_ELLIPSOIDAL_HEIGHT if ellipsoidal and all(ellipsoidal) else CRS
     notes = (
         (f"XMP of {len(unread)} images is left out; the first is {unread[0]}",) if unread else ()
     )
     return Reading(tuple(_in_crs(image, crs) for image in images), tuple(skipped), crs, notes)
+
+
+def _untaken_mcap(path: Path) -> str:
+    names = list(mcap_files(path)[0])
+    return f"; {names[0]} is there: --format mcap reads the images in it instead" if names else ""
 
 
 def _in_crs(image: PosedImage, crs: str) -> PosedImage:

@@ -31,6 +31,14 @@ _When = tuple[int, str]
 
 
 @dataclass(frozen=True, slots=True)
+class _Placed:
+    """A device's pose, world to device. line : of trajectories.txt that says it."""
+
+    pose: Rigid
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
 class _Track:
     """What is known of where devices were.
 
@@ -38,7 +46,7 @@ class _Track:
     itself as seen from there.
     """
 
-    poses: dict[_When, Rigid | str]
+    poses: dict[_When, _Placed | str]
     rigs: dict[str, list[tuple[str, Rigid]]]
 
 
@@ -101,7 +109,7 @@ def _cameras(path: Path) -> dict[str, Camera]:
     return cameras
 
 
-def _poses(path: Path) -> tuple[dict[_When, Rigid | str], list[Skipped]]:
+def _poses(path: Path) -> tuple[dict[_When, _Placed | str], list[Skipped]]:
     """Poses of devices, and the lines that name none."""
     numbers: dict[_When, list[float]] = {}
     unusable: dict[_When, str] = {}
@@ -121,7 +129,10 @@ def _poses(path: Path) -> tuple[dict[_When, Rigid | str], list[Skipped]]:
             numbers[when] = pose_numbers(line.cells[2:])
         except ValueError as error:
             unusable[when] = f"{where}: {error}"
-    poses = dict(zip(numbers, rigids(list(numbers.values())), strict=True))
+    poses = {
+        when: _Placed(pose, line_of[when])
+        for when, pose in zip(numbers, rigids(list(numbers.values())), strict=True)
+    }
     return {**poses, **unusable}, unread
 
 
@@ -150,9 +161,9 @@ def _match(
     track: _Track,
     listing: Listing,
     wanted: Callable[[str], bool],
-) -> tuple[list[tuple[PosedImage, Rigid]], list[Skipped]]:
-    """Images with the pose of their camera, world to camera."""
-    images: dict[str, tuple[PosedImage, Rigid]] = {}
+) -> tuple[list[tuple[PosedImage, _Placed]], list[Skipped]]:
+    """Images with the pose of their camera."""
+    images: dict[str, tuple[PosedImage, _Placed]] = {}
     skipped: list[Skipped] = []
     told = {skip.uri for skip in listing.skipped}
     for line in lines(path / _RECORDS):
@@ -172,7 +183,7 @@ def _match(
 
 def _record(
     line: Line, uri: str, cameras: dict[str, Camera], track: _Track, listing: Listing
-) -> tuple[PosedImage, Rigid] | str:
+) -> tuple[PosedImage, _Placed] | str:
     """One line of records_camera.txt, or why it is left out."""
     if not uri:
         return "expected a timestamp, a device and a path"
@@ -190,36 +201,36 @@ def _record(
     return PosedImage(uri, listing.paths[uri], camera=cameras[when[1]]), pose
 
 
-def _camera_from_world(when: _When, track: _Track, seen: frozenset[str]) -> Rigid | str:
+def _camera_from_world(when: _When, track: _Track, seen: frozenset[str]) -> _Placed | str:
     """The pose of a device, its own or that of a rig it is mounted on, or why there is none."""
     stamp, device = when
     reason = f"none for {device!r} or its rig at {stamp} in {_TRAJECTORIES}"
     own = track.poses.get(when)
-    if isinstance(own, Rigid):
+    if isinstance(own, _Placed):
         return own
     for rig, device_from_rig in track.rigs.get(device, ()):
         if rig in seen:
             continue
         rig_from_world = _camera_from_world((stamp, rig), track, seen | {device})
-        if isinstance(rig_from_world, Rigid):
-            return device_from_rig.after(rig_from_world)
+        if isinstance(rig_from_world, _Placed):
+            return replace(rig_from_world, pose=device_from_rig.after(rig_from_world.pose))
         if (stamp, rig) in track.poses:
             reason = rig_from_world
     return reason if own is None else own
 
 
 def _posed(
-    images: list[tuple[PosedImage, Rigid]], crs: str, north: North
+    images: list[tuple[PosedImage, _Placed]], crs: str, north: North
 ) -> tuple[tuple[PosedImage, ...], tuple[Skipped, ...]]:
     if not images:
         return (), ()
-    world_from_camera = np.stack([pose.rotation.T for _, pose in images])
-    translations = np.stack([pose.translation_m for _, pose in images])
+    world_from_camera = np.stack([placed.pose.rotation.T for _, placed in images])
+    translations = np.stack([placed.pose.translation_m for _, placed in images])
     centres = -np.einsum("nij,nj->ni", world_from_camera, translations)
     angles = np.stack(hpr_from_rotations(world_from_camera), axis=1)
     posed: list[PosedImage] = []
     impossible: list[Skipped] = []
-    for (image, _), (x, y, z), (heading, pitch, roll) in zip(
+    for (image, placed), (x, y, z), (heading, pitch, roll) in zip(
         images, centres.tolist(), angles.tolist(), strict=True
     ):
         pose = Pose(x, y, crs, z, heading, pitch, roll, north)
@@ -227,7 +238,8 @@ def _posed(
         if problem is None:
             posed.append(replace(image, pose=normalised(pose)))
         else:
-            impossible.append(Skipped(image.uri, problem))
+            where = f"{_TRAJECTORIES}, line {placed.line}"
+            impossible.append(Skipped(image.uri, f"{where}: {problem}"))
     return tuple(posed), tuple(impossible)
 
 

@@ -82,8 +82,11 @@ def pose_numbers(cells: list[str]) -> list[float]:
 
     Raises
     ------
-    ValueError : a part is missing, as kapture allows, is no number or no rotation; says which.
+    ValueError : a part is missing, as kapture allows, is no number or no rotation, or there are
+        more; says which.
     """
+    if len(cells) > len(_PARTS):
+        raise ValueError(f"a pose of {len(cells)} numbers, expected 7; are commas decimal?")
     missing = [name for name, cell in zip(_PARTS, cells, strict=False) if not cell]
     missing += _PARTS[len(cells) :]
     if missing:

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from contracts.records import Pose
 from geo.crs import grid_of, parse_crs, parse_full_crs
 from geo.headings import wrapped_180, wrapped_360
+
+Quantity = Literal["easting", "northing", "altitude", "heading", "pitch", "roll"]
 
 _LOWEST_M, _HIGHEST_M = -1_000.0, 10_000.0
 _AREA_MARGIN_DEG = 2.0
@@ -35,12 +38,26 @@ def is_geographic(crs: str) -> bool:
     return bool(parse_crs(crs).is_geographic)
 
 
+@dataclass(frozen=True, slots=True)
+class PoseProblem:
+    """What is impossible about a pose. quantity : which of its numbers."""
+
+    quantity: Quantity
+    reason: str
+
+
 def pose_problem(pose: Pose, geographic: bool) -> str | None:
-    """What is impossible about a pose, or None.
+    """Why a pose is impossible, or None; see `find_problem`."""
+    problem = find_problem(pose, geographic)
+    return None if problem is None else problem.reason
+
+
+def find_problem(pose: Pose, geographic: bool) -> PoseProblem | None:
+    """The first impossible number of a pose, or None.
 
     geographic : its coordinates are degrees, x = longitude, y = latitude.
     """
-    fields = {
+    numbers: dict[Quantity, float | None] = {
         "easting": pose.easting,
         "northing": pose.northing,
         "altitude": pose.altitude_m,
@@ -48,18 +65,20 @@ def pose_problem(pose: Pose, geographic: bool) -> str | None:
         "pitch": pose.pitch_deg,
         "roll": pose.roll_deg,
     }
-    for name, value in fields.items():
+    for quantity, value in numbers.items():
         if value is not None and not math.isfinite(value):
-            return f"{name} is {value}, expected a finite number"
+            return PoseProblem(quantity, f"{quantity} is {value}, expected a finite number")
     if geographic and not (abs(pose.easting) <= 180.0 and abs(pose.northing) <= 90.0):
-        return (
+        return PoseProblem(
+            "easting" if abs(pose.easting) > 180.0 else "northing",
             f"longitude {pose.easting:g}, latitude {pose.northing:g} degrees, expected within "
-            "180 and 90; are they swapped, or metres?"
+            "180 and 90; are they swapped, or metres?",
         )
     if pose.altitude_m is not None and not _LOWEST_M <= pose.altitude_m <= _HIGHEST_M:
-        return f"altitude is {pose.altitude_m:g} m, expected {_LOWEST_M:g} to {_HIGHEST_M:g}"
+        expected = f"expected {_LOWEST_M:g} to {_HIGHEST_M:g}"
+        return PoseProblem("altitude", f"altitude is {pose.altitude_m:g} m, {expected}")
     if pose.pitch_deg is not None and abs(pose.pitch_deg) > 90.0:
-        return f"pitch is {pose.pitch_deg:g} degrees, expected -90 to 90"
+        return PoseProblem("pitch", f"pitch is {pose.pitch_deg:g} degrees, expected -90 to 90")
     return None
 
 

@@ -1,14 +1,28 @@
-"""The survey formats, in the order in which they are tried. A new one is one more line."""
+"""The survey formats, in the order in which they are tried. A new one is one more line.
 
+A folder with image files of its own is a survey of those: an MCAP file in it, such as an export
+for a viewer, is read only with `--format mcap` or by its own path.
+"""
+
+from dataclasses import replace
 from pathlib import Path
 
 from contracts.errors import BadConfig, BadSurvey
 from survey import exif, kapture, mcap, plain, stereopolis, tables, utm_names
+from survey.files import list_images
 from survey.options import Reader, ReadOptions
+
+
+def _recognises_mcap(path: Path) -> bool:
+    """An MCAP file, or a folder with some and without image files."""
+    return mcap.READER.recognises(path) and (path.is_file() or not list_images(path).paths)
+
+
+_MCAP = replace(mcap.READER, recognises=_recognises_mcap)
 
 READERS: tuple[Reader, ...] = (
     stereopolis.READER,
-    mcap.READER,
+    _MCAP,
     kapture.READER,
     tables.READER,
     utm_names.READER,
@@ -33,7 +47,7 @@ def choose_reader(path: Path, options: ReadOptions) -> Reader:
     if options.mapping is not None:
         return tables.READER
     if options.no_pose:
-        return mcap.READER if mcap.READER.recognises(path) else plain.READER
+        return _MCAP if _MCAP.recognises(path) else plain.READER
     for reader in READERS:
         if reader.recognises(path):
             return reader

@@ -137,7 +137,7 @@ def _posed(uri: str, shot: _Shot, listing: Listing, options: ReadOptions) -> Pos
     )
     problem = pose_problem(pose, geographic=False)
     if problem is not None:
-        return f"panorama {panorama.number}: {problem}"
+        return f"{PANORAMAS}, panorama {panorama.number}: {problem}"
     has_mask = options.use_masks and camera.mask is not None
     return PosedImage(
         uri=uri,
@@ -170,7 +170,7 @@ def _panorama(number: int, entry: dict[str, object]) -> _Panorama | str:
     for key in ("easting", "northing", "altitude", "heading", "pitch", "roll"):
         value = entry.get(key)
         if not isinstance(value, int | float) or not math.isfinite(value):
-            return f"panorama {number}: {key} is {value}, expected a finite number"
+            return f"{PANORAMAS}, panorama {number}: {key} is {value}, expected a finite number"
         values[key] = float(value)
     date = entry.get("date")
     return _Panorama(

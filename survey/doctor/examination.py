@@ -1,7 +1,7 @@
 """Examine a survey before any work: all checks, in one order."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from survey.doctor.opening import Opened, open_survey
 from survey.doctor.pairing import check_skipped
 from survey.doctor.pictures import check_pictures
 from survey.doctor.positions import check_positions, check_spacing
-from survey.doctor.systems import check_system
+from survey.doctor.systems import LOCAL_FRAME, check_system
 from survey.doctor.times import check_clock, check_times
 from survey.doctor.track import Track, track_of
 from survey.doctor.vehicle import check_vehicle
@@ -63,7 +63,7 @@ def examine(path: Path, options: ReadOptions, now: datetime) -> Examination:
     track = None
     if inside and opened.crs:
         track = track_of(inside, opened.crs, options.allow_ballpark)
-    findings = [*opened.findings, *findings]
+    findings = [*_without_contrary_advice(opened.findings, findings), *findings]
     findings += check_skipped(opened.images, opened.skipped, options.no_pose)
     if opened.images:
         findings += check_times(opened.images, now)
@@ -78,6 +78,15 @@ def examine(path: Path, options: ReadOptions, now: datetime) -> Examination:
         findings=by_severity(findings),
         track=track,
     )
+
+
+def _without_contrary_advice(
+    refusals: Iterable[Finding], findings: Iterable[Finding]
+) -> Iterator[Finding]:
+    """No --crs mends metres from an origin of their own."""
+    local = any(finding.check == LOCAL_FRAME for finding in findings)
+    for refusal in refusals:
+        yield replace(refusal, mend="") if local else refusal
 
 
 def _of_track(track: Track | None, opened: Opened, options: ReadOptions) -> Iterator[Finding]:

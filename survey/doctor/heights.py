@@ -100,7 +100,8 @@ def _unknown_zero(track: Track, survey_format: str) -> Iterator[Finding]:
 def _system_with_heights(track: Track, survey_format: str) -> str:
     """What to give as --crs so that altitudes count from something, "" where nothing can be."""
     crs = parse_crs(track.place.crs_text)
-    if survey_format in _FIXED or (survey_format == "mcap" and crs.is_geographic):
+    said = vertical_reference(parse_full_crs(track.place.crs_text)) is not None
+    if said or survey_format in _FIXED or (survey_format == "mcap" and crs.is_geographic):
         return ""
     if crs.is_geographic:
         return _ELLIPSOIDAL

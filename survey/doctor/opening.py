@@ -21,7 +21,8 @@ class Opened:
     """What a reader found.
 
     images, skipped : in order of their uris' bytes. crs : of every pose; None: poses have none,
-    or `bare`. bare : coordinates are numbers whose system is not known or cannot be right.
+    `bare`, or the system is known and has no conversion to WGS 84. bare : coordinates are numbers
+    whose system is not known or cannot be right.
     findings : why it would be refused, and what the reader itself has to say.
     """
 
@@ -63,7 +64,9 @@ def open_survey(path: Path, options: ReadOptions) -> Opened:
         found = bare if bare.images else reading
         return _opened(path, reader, found, (*notes, refusal), bare=True)
     refused = _refused_crs(reading, options)
-    return _opened(path, reader, reading, notes + refused, bare=bool(refused))
+    if refused:
+        reading = replace(reading, crs=None)
+    return _opened(path, reader, reading, notes + refused, bare=False)
 
 
 def _opened(

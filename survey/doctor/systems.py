@@ -43,8 +43,10 @@ def check_system(opened: Opened) -> tuple[tuple[PosedImage, ...], list[Finding]]
         return (), []
     x = np.array([image.pose.easting for image in posed if image.pose])
     y = np.array([image.pose.northing for image in posed if image.pose])
-    if opened.bare or opened.crs is None:
+    if opened.bare:
         return (), [_unknown_system(opened, x, y)]
+    if opened.crs is None:  # known, and why it cannot be used is said
+        return (), []
     outside = outside_area([image.pose for image in posed if image.pose], opened.crs)
     inside = tuple(image for image, out in zip(posed, outside, strict=True) if not out)
     if not outside.any():
@@ -96,6 +98,7 @@ _SWAP_COLUMNS = (
 
 
 _NEAR_AN_ORIGIN_M = 10_000.0
+LOCAL_FRAME = "local-frame"
 _LOCAL = "bring the poses into a map's system first, or index without positions: --no-pose"
 
 
@@ -113,7 +116,7 @@ def _with_suggestion(
     """What fits the numbers as they are, else swapped, else nothing."""
     if opened.format in _METRIC and max(np.abs(x).max(), np.abs(y).max()) < _NEAR_AN_ORIGIN_M:
         what += "; these are metres from an origin of their own, as in no usual coordinate system"
-        return Finding("local-frame", "error", what, mend=_LOCAL)
+        return Finding(LOCAL_FRAME, "error", what, mend=_LOCAL)
     middle = float(np.median(x)), float(np.median(y))
     straight, swapped = likely_systems(*middle), likely_systems(middle[1], middle[0])
     for codes, how in ((straight, ""), (swapped, " with x and y swapped")):

@@ -1,7 +1,8 @@
 """Heading, pitch and roll of every row, from whatever the table has to say them with."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from geo.rotations import (
     rotations_from_opk,
     rotations_from_quaternions,
 )
+from survey.poses import Quantity
 from survey.tables.convention import Convention
 from survey.tables.profile import MATRIX, Role
 from survey.tables.quantities import read_numbers
@@ -30,7 +32,7 @@ _AXES_FROM_RDF: dict[str, NDArray[np.float64]] = {
 }
 _OPK: tuple[Role, ...] = ("omega", "phi", "kappa")
 _QUATERNION: tuple[Role, ...] = ("qw", "qx", "qy", "qz")
-_HPR: tuple[Role, ...] = ("heading", "pitch", "roll")
+_HPR: tuple[Literal["heading", "pitch", "roll"], ...] = ("heading", "pitch", "roll")
 _MOST_TURNS_DEG = 3600.0
 """A larger angle is no angle, or not in this unit."""
 _UNIT_LENGTH = 0.01
@@ -40,13 +42,17 @@ _AGREE = 2e-3
 
 @dataclass(frozen=True, slots=True)
 class Attitudes:
-    """heading_deg [0, 360), pitch_deg, roll_deg (-180, 180] : (n,) float64, NaN: not known."""
+    """heading_deg [0, 360), pitch_deg, roll_deg (-180, 180] : (n,) float64, NaN: not known.
+
+    columns : which column says what; empty if a whole attitude is said together.
+    """
 
     heading_deg: NDArray[np.float64]
     pitch_deg: NDArray[np.float64]
     roll_deg: NDArray[np.float64]
     faults: Faults
     notes: tuple[str, ...] = ()
+    columns: Mapping[Quantity, int] = field(default_factory=dict)
 
 
 def read_attitudes(table: Table, found: Mapping[Role, int], convention: Convention) -> Attitudes:
@@ -115,7 +121,8 @@ def _from_angles(table: Table, found: Mapping[Role, int], convention: Convention
     if convention.roll_sense == "left_down":
         roll = -roll
     heading = wrapped_360(heading + _ZERO_DEG[convention.heading_zero])
-    return Attitudes(heading, pitch, wrapped_180(roll), faults, notes)
+    columns: dict[Quantity, int] = {angle: found[angle] for angle in _HPR if angle in found}
+    return Attitudes(heading, pitch, wrapped_180(roll), faults, notes, columns)
 
 
 def _columns(

@@ -1,15 +1,18 @@
 """Where every row's camera stood, all rows in one coordinate system."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadSurvey, UnknownCrs
-from geo.crs import ToWgs84, parse_crs
-from survey.poses import crs_name, is_geographic
+from contracts.records import Pose
+from geo.crs import grid_of, parse_crs
+from geo.reprojection import Reprojected, reproject
+from survey.options import ReadOptions
+from survey.poses import Quantity, crs_name, is_geographic
 from survey.tables.profile import Profile, Role
 from survey.tables.quantities import read_numbers
 from survey.tables.table import Faults, Table, first_faults
@@ -26,7 +29,7 @@ class Positions:
     """(n,) float64 each, NaN where not known, all in `crs`.
 
     grid_turn_deg : to be added to a heading from the row's own grid north to count it from that
-    of `crs`.
+    of `crs`. columns : which column says what, of easting, northing and altitude.
     """
 
     easting: NDArray[np.float64]
@@ -36,32 +39,35 @@ class Positions:
     crs: str
     geographic: bool
     faults: Faults
+    columns: Mapping[Quantity, int]
     notes: tuple[str, ...] = ()
 
 
 def read_positions(
-    table: Table, found: Mapping[Role, int], profile: Profile, given: str | None
+    table: Table, found: Mapping[Role, int], profile: Profile, options: ReadOptions
 ) -> Positions:
     """Positions by geometry, else by x and y, else by lon and lat; lon and lat before x and y
-    unless `given` is a projected system.
+    unless `options.crs` is a projected system.
 
     Parameters
     ----------
-    found : which column is what. given : the user's `--crs`.
+    found : which column is what.
 
     Raises
     ------
     UnknownCrs : coordinates without a system, or one that is not known.
-    BadSurvey : `given` contradicts the table.
+    BadSurvey : `options.crs` contradicts the table.
     """
-    chosen = given or (None if table.crs else profile.crs)
+    chosen = options.crs or (None if table.crs else profile.crs)
     given = None if chosen is None else crs_name(chosen)
     at = _coordinates(table, found, profile, given)
     if "crs" in found and table.crs is None and not at.in_degrees:
-        return _RowSystems.read(table, found["crs"], given).joined(at, given)
+        systems = _RowSystems.read(table, found["crs"], given)
+        return systems.joined(at, given, options.allow_ballpark)
     crs = _one_system(table, found, given, at.in_degrees)
+    turn_deg = np.zeros(len(table))
     return Positions(
-        at.x, at.y, at.altitude_m, np.zeros(len(table)), crs, is_geographic(crs), at.faults
+        at.x, at.y, at.altitude_m, turn_deg, crs, is_geographic(crs), at.faults, at.columns
     )
 
 
@@ -74,6 +80,7 @@ class _Coordinates:
     altitude_m: NDArray[np.float64]
     in_degrees: bool
     faults: Faults
+    columns: Mapping[Quantity, int]
 
 
 def _coordinates(
@@ -81,23 +88,31 @@ def _coordinates(
 ) -> _Coordinates:
     """Coordinates by geometry, else by columns."""
     altitude = read_numbers(table, found.get("z"), "altitude", profile.convention.unknown)
+    columns: dict[Quantity, int] = {}
     if table.xyz is not None:
         x, y, height = table.xyz.T
         altitude_m = np.where(np.isfinite(height), height, altitude.values)
-        return _Coordinates(x, y, altitude_m, False, first_faults(table.faults, altitude.faults))
+        faults = first_faults(table.faults, altitude.faults)
+        if "z" in found and not np.isfinite(height).any():
+            columns["altitude"] = found["z"]
+        return _Coordinates(x, y, altitude_m, False, faults, columns)
     in_degrees = _in_degrees(table, found, given)
     if in_degrees:
+        columns |= {"easting": found["lon"], "northing": found["lat"]}
         across = read_numbers(table, found["lon"], "longitude")
         along = read_numbers(table, found["lat"], "latitude")
     else:
+        columns |= {"easting": found["x"], "northing": found["y"]}
         across = read_numbers(table, found["x"], "easting")
         along = read_numbers(table, found["y"], "northing")
+    if "z" in found:
+        columns["altitude"] = found["z"]
     empty = {
         int(at): f"{table.row(int(at))}: image without pose: its coordinates are empty"
         for at in np.flatnonzero(np.isnan(across.values) | np.isnan(along.values))
     }
     faults = first_faults(table.faults, across.faults, along.faults, altitude.faults, empty)
-    return _Coordinates(across.values, along.values, altitude.values, in_degrees, faults)
+    return _Coordinates(across.values, along.values, altitude.values, in_degrees, faults, columns)
 
 
 def _in_degrees(table: Table, found: Mapping[Role, int], given: str | None) -> bool:
@@ -183,7 +198,7 @@ class _RowSystems:
         }
         return cls(table, names, faults)
 
-    def joined(self, written: _Coordinates, given: str | None) -> Positions:
+    def joined(self, written: _Coordinates, given: str | None, allow_ballpark: bool) -> Positions:
         """All rows in the most frequent system; those of others are converted into it."""
         counts = Counter(name for name in self.names if name)
         if not counts:
@@ -191,49 +206,66 @@ class _RowSystems:
             raise UnknownCrs(f"pose table {self.table.path}: no row has a known system: {reason}")
         crs = min(counts, key=lambda name: (-counts[name], name))
         others = sorted(counts.keys() - {crs})
-        columns = (written.x.copy(), written.y.copy(), np.zeros(len(self.table)))
-        faults, notes = first_faults(self.faults, written.faults), []
-        for name in others:
-            rows = [at for at, other in enumerate(self.names) if other == name]
-            faults |= self._convert(rows, name, crs, columns, faults)
-            notes.append(f"{self.table.path.name}: {len(rows)} rows converted from {name} to {crs}")
         if not others:
             crs = _agreed(self.table, crs, given)
+        x, y, altitude_m = written.x.copy(), written.y.copy(), written.altitude_m.copy()
+        turn_deg = np.zeros(len(self.table))
+        faults = first_faults(self.faults, written.faults)
+        notes: list[str] = []
+        for name in others:
+            rows = self._whole_rows(name, written, faults)
+            poses = [_pose(written, at, name) for at in rows]
+            try:
+                found = reproject(poses, crs, allow_ballpark)
+            except UnknownCrs as error:
+                faults |= {at: f"{self.table.row(at)}: {error}" for at in rows}
+                continue
+            x[rows] = [pose.easting for pose in found.poses]
+            y[rows] = [pose.northing for pose in found.poses]
+            altitude_m[rows] = [_number(pose.altitude_m) for pose in found.poses]
+            turn_deg[rows] = _turns_deg(found)
+            notes += found.told(f"{self.table.path.name}, {len(rows)} rows")
+        geographic = is_geographic(crs)
         return Positions(
-            columns[0],
-            columns[1],
-            written.altitude_m,
-            columns[2],
-            crs,
-            is_geographic(crs),
-            faults,
-            tuple(notes),
+            x, y, altitude_m, turn_deg, crs, geographic, faults, written.columns, tuple(notes)
         )
 
-    def _convert(
-        self,
-        rows: Sequence[int],
-        name: str,
-        crs: str,
-        columns: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-        faults: Faults,
-    ) -> Faults:
-        """Convert rows of one system in place; the faults of those that cannot be."""
-        easting, northing, turn = columns
-        good = [
+    def _whole_rows(self, name: str, written: _Coordinates, faults: Faults) -> list[int]:
+        """The rows of one system that have a place that can be converted."""
+        return [
             at
-            for at in rows
-            if at not in faults and max(abs(easting[at]), abs(northing[at])) < _HUGE
+            for at, own in enumerate(self.names)
+            if own == name
+            and at not in faults
+            and max(abs(written.x[at]), abs(written.y[at])) < _HUGE
         ]
-        try:
-            there, here = ToWgs84(name), ToWgs84(crs)
-            lon, lat = there.lon_lat(easting[good], northing[good])
-            turn[good] = there.convergence_deg(easting[good], northing[good])
-            easting[good], northing[good] = here.from_lon_lat(lon, lat)
-            turn[good] -= here.convergence_deg(easting[good], northing[good])
-        except UnknownCrs as error:
-            return {at: f"{self.table.row(at)}: {error}" for at in good}
-        return {}
+
+
+def _pose(written: _Coordinates, at: int, crs: str) -> Pose:
+    """The place of one row, looking to the north of its own grid."""
+    altitude_m = float(written.altitude_m[at])
+    return Pose(
+        float(written.x[at]),
+        float(written.y[at]),
+        crs,
+        None if np.isnan(altitude_m) else altitude_m,
+        heading_deg=0.0,
+        north="grid",
+    )
+
+
+def _turns_deg(found: Reprojected) -> NDArray[np.float64]:
+    """(n,) the headings of `_pose`, true once converted, from the north of the new grid."""
+    x, y, true_deg = (
+        np.array([(pose.easting, pose.northing, _number(pose.heading_deg)) for pose in found.poses])
+        .reshape(-1, 3)
+        .T
+    )
+    return np.asarray(true_deg - grid_of(found.crs).convergence_deg(x, y))
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value
 
 
 def _by_code(text: str) -> str:

@@ -183,10 +183,20 @@ PROFILES: tuple[Profile, ...] = (
 _OF_RESULTS = frozenset({"query", "rank", "score"})
 """Columns of what `flaneur locate` writes, which may lie in the survey's folder."""
 
+NOT_RESULTS = (
+    "these are results of `flaneur locate`, not a survey; give the folder or the pose table that "
+    "was indexed"
+)
+
+
+def of_results(header: Sequence[str]) -> bool:
+    """Whether a header is of results of `flaneur locate`."""
+    return {plain_name(name) for name in header} >= _OF_RESULTS
+
 
 def recognised(header: Sequence[str], has_position: bool = False) -> Profile | None:
     """The first profile that a header fits; None for results, which name images as well."""
-    if {plain_name(name) for name in header} >= _OF_RESULTS:
+    if of_results(header):
         return None
     return next((p for p in PROFILES if p.fits(header, has_position)), None)
 

@@ -7,14 +7,14 @@ degrees.
 from collections.abc import Callable
 from pathlib import Path
 
-from contracts.errors import BadSurvey
+from contracts.errors import BadSurvey, WrongInput
 from contracts.records import PosedImage, Skipped
 from survey.files import list_images
 from survey.options import Reader, Reading, ReadOptions
 from survey.tables import mapping, records, text, vector
 from survey.tables.images import ImageFinder, filled
 from survey.tables.profile import Profile
-from survey.tables.profiles import recognised, recognised_cells
+from survey.tables.profiles import NOT_RESULTS, of_results, recognised, recognised_cells
 from survey.tables.rows import Rows, read_rows
 from survey.tables.table import Table
 
@@ -98,6 +98,24 @@ def _candidates(folder: Path) -> list[Path]:
     ]
 
 
+def untaken_tables(folder: Path) -> str:
+    """What is to be told of the files in a folder that could be pose tables; "" without any.
+
+    A `.txt` that is no table is a text like others.
+    """
+    told = ""
+    for file in _candidates(folder):
+        try:
+            _read_table(file, None)
+        except WrongInput as error:
+            if file.suffix.lower() != ".txt":
+                reason = str(error).removeprefix(f"pose table {file}").lstrip(":, ")
+                told += f"; {file.name} is there but is no pose table: {reason}"
+        else:
+            told += f"; {file.name} is there: give its path if it is the pose table"
+    return told
+
+
 def _read_table(file: Path, given: mapping.TableMapping | None) -> tuple[Table, Profile]:
     own = None if given is None else given.profile
     if vector.vector_format(file) is not None:
@@ -116,6 +134,8 @@ def _profile(table: Table) -> Profile:
     if not table.names:
         profile = recognised_cells([column[0] for column in map(table.texts, range(table.width))])
     else:
+        if of_results(table.names):
+            raise BadSurvey(f"pose table {table.path}: {NOT_RESULTS}")
         profile = recognised(table.names, has_position=table.xyz is not None)
     if profile is None:
         raise BadSurvey(

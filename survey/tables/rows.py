@@ -1,6 +1,6 @@
 """The rows of a table as poses and cameras, every column read once."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from contracts.config import North
 from contracts.records import Camera, Pose, PosedImage
 from geo.headings import wrapped_360
 from survey.options import ReadOptions
-from survey.poses import pose_problem
+from survey.poses import PoseProblem, Quantity, find_problem
 from survey.tables.attitudes import Attitudes, read_attitudes
 from survey.tables.moments import read_moments
 from survey.tables.positions import Positions, read_positions
@@ -26,11 +26,12 @@ _QUATERNION = {"qw", "qx", "qy", "qz"}
 class Rows:
     """What n rows say; lists of n, None: not known.
 
-    files, cameras : as written. north : from which all headings count. faults : rows that are
-    left out, and why. notes : what a person should know.
+    columns : which column says what. files, cameras : as written. north : from which all headings
+    count. faults : rows that are left out, and why. notes : what a person should know.
     """
 
     table: Table
+    columns: Mapping[Quantity, int]
     files: Sequence[str]
     cameras: Sequence[str]
     positions: Positions
@@ -58,13 +59,18 @@ class Rows:
             north=self.north,
             position_error_m=self.errors_m[at],
         )
-        problem = pose_problem(pose, self.positions.geographic)
+        problem = find_problem(pose, self.positions.geographic)
         if problem is not None:
-            return f"{self.table.row(at)}: {problem}"
+            return f"{self._place(at, problem)}: {problem.reason}"
         camera = Camera(name=self.cameras[at], hfov_deg=self.hfovs_deg[at])
         return PosedImage(
             uri=uri, path=path, pose=pose, camera=camera, captured_at=self.captured_at[at]
         )
+
+    def _place(self, at: int, problem: PoseProblem) -> str:
+        """The cell of an impossible number, or the row where no one column says it."""
+        column = self.columns.get(problem.quantity)
+        return self.table.row(at) if column is None else self.table.cell(at, column)
 
 
 def read_rows(table: Table, profile: Profile, options: ReadOptions) -> Rows:
@@ -77,7 +83,7 @@ def read_rows(table: Table, profile: Profile, options: ReadOptions) -> Rows:
     """
     found = profile.find(table.names, table.width, str(table.path))
     convention = profile.convention
-    positions = read_positions(table, found, profile, options.crs)
+    positions = read_positions(table, found, profile, options)
     attitudes = read_attitudes(table, found, convention)
     moments = read_moments(table, found.get("time"), convention)
     hfov = read_numbers(table, found.get("hfov"), "hfov", convention.unknown)
@@ -88,6 +94,7 @@ def read_rows(table: Table, profile: Profile, options: ReadOptions) -> Rows:
         headings = wrapped_360(headings + positions.grid_turn_deg)
     return Rows(
         table=table,
+        columns={**positions.columns, **attitudes.columns},
         files=table.texts(found.get("file")),
         cameras=table.texts(found.get("camera")),
         positions=positions,

@@ -2,6 +2,7 @@
 
 import codecs
 import csv
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,8 @@ from survey.tables.table import Faults, Table
 
 WHITESPACE = " "
 _SEPARATORS = (",", ";", "\t", "|", WHITESPACE)
+_SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "blanks"}
+_STATED = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _HEADER_BYTES = 65_536
 _MAX_LINE = 1_000_000
 """Characters of a line; a longer one is no row of a table."""
@@ -45,8 +48,8 @@ def read_text(path: Path, layout: Layout, profile: Profile | None) -> Table:
     """All rows of a separated-values file.
 
     UTF-8 with or without a byte order mark, UTF-16 or UTF-32 with one, else Latin-1, unless the
-    layout says; separated by comma, semicolon, tab, bar or blanks, whichever makes a first line
-    that a profile knows.
+    layout says; separated by what a line `sep=;` before all others says, as Excel has it, else by
+    comma, semicolon, tab, bar or blanks, whichever makes a first line that a profile knows.
 
     Raises
     ------
@@ -54,7 +57,9 @@ def read_text(path: Path, layout: Layout, profile: Profile | None) -> Table:
     """
     lines = _Lines(path, layout.encoding or _encoding(path))
     first = _first_line(lines, layout.skip_lines)
-    separator = layout.separator or _separator(first, _knower(profile, layout))
+    if stated := _stated_separator(first):
+        first = _first_line(lines, lines.number)
+    separator = layout.separator or stated or _separator(first, _knower(profile, layout))
     cells = _cells(first, separator)
     header = layout.header
     if header is None:
@@ -63,6 +68,8 @@ def read_text(path: Path, layout: Layout, profile: Profile | None) -> Table:
     body = list(_rows(lines, separator, lines.number, skip_first=header))
     rows = [row for _, row in body]
     width = len(cells)
+    if header:
+        _refuse_other_separator(path, body, separator, width)
     comma = separator != "," if layout.decimal_comma is None else layout.decimal_comma
     table = Table(
         path, names, _columns(rows, width), [number for number, _ in body], decimal_comma=comma
@@ -85,8 +92,11 @@ def looks_like_poses(path: Path) -> bool:
     except OSError:
         return False
     text = start.decode(_bom(start) or "latin-1", "replace").lstrip("\ufeff \r\n\t")
-    line = text.splitlines()[0] if text else ""
-    return any(_known(_cells(line, separator)) for separator in _SEPARATORS)
+    lines = [line for line in text.splitlines() if line.strip()]
+    stated = _stated_separator(lines[0]) if lines else None
+    first = lines[0 if stated is None else 1 :][:1]
+    separators = _SEPARATORS if stated is None else (stated,)
+    return any(_known(_cells(line, separator)) for line in first for separator in separators)
 
 
 def _known(cells: Sequence[str]) -> bool:
@@ -203,6 +213,33 @@ def _separator(line: str, known: Callable[[Sequence[str]], bool]) -> str:
         if known(_cells(line, separator)):
             return separator
     return max(_SEPARATORS[:-1], key=line.count)
+
+
+def _stated_separator(line: str) -> str | None:
+    found = _STATED.fullmatch(line.rstrip("\r\n"))
+    return None if found is None else found[1]
+
+
+def _refuse_other_separator(
+    path: Path, body: list[tuple[int, list[str]]], separator: str, width: int
+) -> None:
+    """Refuse rows that all have as many cells as the header, but by another separator."""
+    for other in _SEPARATORS:
+        if not body or not all(_is_by_other(row, separator, other, width) for _, row in body):
+            continue
+        rows, header = _SEPARATOR_NAMES[other], _SEPARATOR_NAMES.get(separator, repr(separator))
+        raise BadSurvey(
+            f"pose table {path}, line {body[0][0]}: the rows are separated by {rows}, the header "
+            f"by {header}; write both with the same separator"
+        )
+
+
+def _is_by_other(row: list[str], separator: str, other: str, width: int) -> bool:
+    """Decimal commas may make as many cells: `a.jpg;1,5;2,5` has three either way."""
+    apart = len(row) != width or (
+        separator == "," and other != WHITESPACE and sum(other in cell for cell in row) > 1
+    )
+    return other != separator and apart and len(_cells(separator.join(row), other)) == width
 
 
 def _encoding(path: Path) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from contracts.errors import BadSurvey
 from survey.poses import crs_name
 from survey.tables.profile import Profile
-from survey.tables.profiles import recognised
+from survey.tables.profiles import NOT_RESULTS, of_results, recognised
 from survey.tables.table import Column, Faults, Table
 
 if TYPE_CHECKING:
@@ -98,6 +98,8 @@ def _pose_layer(path: Path, profile: Profile | None) -> _Layer:
     good = [layer for layer in layers if fits(layer.fields, layer.has_points)]
     if len(good) == 1:
         return good[0]
+    if not good and any(of_results(layer.fields) for layer in layers):
+        raise BadSurvey(f"pose table {path}: {NOT_RESULTS}")
     named = "; ".join(
         f"{layer.name or path.stem} ({', '.join(layer.fields) or 'no columns'})"
         for layer in good or layers
@@ -164,8 +166,18 @@ def _reading(path: Path) -> Iterator[None]:
         *(ArithmeticError, AttributeError, KeyError, OSError, RuntimeError, TypeError),
         *(ValueError, ProjError, ShapelyError),
     ) as error:
+        if vector_format(path) == "GeoJSON" and not _is_utf8(path):
+            raise BadSurvey(f"pose table {path} is not UTF-8; save it as UTF-8") from error
         first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise BadSurvey(f"pose table {path} cannot be read: {first_line}") from error
+
+
+def _is_utf8(path: Path) -> bool:
+    try:
+        path.read_bytes().decode()
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _column(cells: "pandas.Series") -> Column:

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from doctored_survey import (
+    EAST_M,
     FIELDS,
+    NORTH_M,
     NOW,
     Row,
     good_rows,
@@ -192,6 +194,14 @@ def test_a_vehicle_in_the_picture_is_told_with_where(folder: Path, rows: list[Ro
     finding = found(examined(folder, rows), "vehicle")
     assert finding.severity == "warning"
     assert "% down" in finding.what
+
+
+def test_a_vehicle_in_a_dense_film_is_told(folder: Path, rows: list[Row]) -> None:
+    """0.7 m from image to image is not standing still."""
+    for number, row in enumerate(rows):
+        row |= {"x": EAST_M + 0.7 * number, "y": NORTH_M, "heading": 90.0}
+        bonnet(folder / str(row["file"]))
+    assert found(examined(folder, rows), "vehicle").severity == "warning"
 
 
 def test_a_street_without_a_vehicle_is_none(folder: Path, rows: list[Row]) -> None:

@@ -25,6 +25,7 @@ def test_metres_of_a_local_frame_are_not_taken_for_degrees(tmp_path: Path) -> No
     for options in (ReadOptions(), ReadOptions(crs="EPSG:2154")):
         found = findings(tmp_path / "drive.mcap", options)
         assert "--no-pose" in found["local-frame"].mend
+        assert not any("--crs" in each.mend for each in found.values())
         assert not any("EPSG:4326" in each.what + each.mend for each in found.values())
 
 

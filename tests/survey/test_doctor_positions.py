@@ -183,7 +183,29 @@ def test_a_height_that_jumps_is_told(folder: Path, rows: list[Row]) -> None:
 
 def test_an_unknown_vertical_datum_is_a_note(folder: Path, rows: list[Row]) -> None:
     finding = found(examined(folder, rows), "height-datum")
-    assert (finding.severity, "--crs" in finding.mend) == ("note", True)
+    assert (finding.severity, finding.mend[:20]) == ("note", "--crs EPSG:2154+5720")
+
+
+@pytest.mark.parametrize(
+    ("crs", "place", "mend"),
+    [("EPSG:4326", (2.35, 48.85), "--crs EPSG:4979, if"),
+     ("EPSG:27700", (530_000.0, 180_000.0), "--crs with the heights' system"),
+     ("EPSG:32631", (452_000.0, 5_411_000.0), "--crs with the heights' system"),
+     ("EPSG:3949", (1_652_000.0, 8_180_000.0), "--crs EPSG:3949+5720, if")],
+)  # fmt: skip
+def test_the_height_system_that_is_advised_fits_the_place(
+    folder: Path, rows: list[Row], crs: str, place: tuple[float, float], mend: str
+) -> None:
+    few = of_camera(rows, "ahead")
+    few = at(few, *place) if abs(place[0]) < 180.0 else shifted(few, *place)
+    finding = found(examined(folder, few, ReadOptions(crs=crs)), "height-datum")
+    assert finding.mend.startswith(mend)
+    assert "2154" not in finding.what + finding.mend
+
+
+def test_no_option_tells_from_what_the_heights_of_photographs_count(test_data: Path) -> None:
+    examination = examine(test_data / "gps-photos" / "lund", ReadOptions(), NOW)
+    assert found(examination, "height-datum").mend == ""
 
 
 @pytest.mark.parametrize(
@@ -210,7 +232,9 @@ def test_a_conversion_nobody_knows_is_an_error_or_as_allowed_a_warning(
     """A system on a sphere of its own, with no shift to WGS 84."""
     few = shifted(of_camera(rows, "ahead"), 0.0, 0.0)
     crs = "+proj=tmerc +lat_0=48 +lon_0=2 +ellps=airy +units=m +no_defs +type=crs"
-    assert found(examined(folder, few, ReadOptions(crs=crs)), "refused").severity == "error"
+    refused = examined(folder, few, ReadOptions(crs=crs))
+    assert found(refused, "refused").severity == "error"
+    assert "wrong-crs" not in {each.check for each in refused.findings}
     allowed = examined(folder, few, ReadOptions(crs=crs, allow_ballpark=True))
     assert found(allowed, "datum").severity == "warning"
 

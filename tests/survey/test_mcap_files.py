@@ -92,9 +92,6 @@ def test_a_file_cut_anywhere_gives_what_comes_before_the_cut(tmp_path):
     @settings(max_examples=300, deadline=None)
     def check(length):
         cut.write_bytes(whole[:length])
-        if length < len(MAGIC):
-            assert not READER.recognises(cut)
-            return
         try:
             reading = read(cut)
         except BadSurvey:

@@ -121,6 +121,12 @@ def test_an_image_without_a_whole_pose_is_skipped(tmp_path: Path, line: str, why
     assert why in reason(reading, "a.jpg")
 
 
+def test_an_impossible_pose_is_told_with_the_line_that_says_it(tmp_path: Path) -> None:
+    too_high = cells(EAST.T, PLACE + np.array([0.0, 0.0, 20_000.0]))
+    root = folder(tmp_path, "1, cam0, a.jpg\n", f"# poses\n1, cam0, {too_high}\n")
+    assert reason(read(root), "a.jpg").startswith("sensors/trajectories.txt, line 2: altitude is 2")
+
+
 def test_a_record_that_does_not_hold_is_skipped_with_its_line(tmp_path: Path) -> None:
     records = (
         "0, cam0, a.jpg\n0, cam0, a.jpg\n0, gps1, b.jpg\nx, cam0, b.jpg\n"

@@ -5,6 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from made_surveys import MAKERS
+from pictured import AS_IT_IS
 from PIL import Image
 
 from contracts.errors import BadConfig, BadSurvey, UnknownCrs
@@ -174,6 +176,37 @@ def test_images_without_poses_are_refused_with_the_way_out(tmp_path: Path) -> No
         read_survey(tmp_path, ReadOptions())
 
 
+def test_files_that_could_be_pose_tables_are_told_when_no_image_has_a_pose(tmp_path: Path) -> None:
+    picture(tmp_path / "a.jpg")
+    (tmp_path / "poses.csv").write_text("name,place\na.jpg,here\n")
+    (tmp_path / "empty.csv").touch()
+    (tmp_path / "poses.txt").write_text("file,lon,lat\na.jpg,2,48\n")
+    (tmp_path / "notes.txt").write_text("Taken in spring.\n")
+    with pytest.raises(BadSurvey, match="--no-pose") as refused:
+        read_survey(tmp_path, ReadOptions())
+    told = str(refused.value)
+    assert "; poses.csv is there but is no pose table: columns ['name', 'place'], expected" in told
+    assert "; empty.csv is there but is no pose table: is empty" in told
+    assert "; poses.txt is there: give its path" in told
+    assert "notes.txt" not in told
+
+
+def test_an_mcap_file_beside_images_is_not_the_survey(tmp_path: Path) -> None:
+    table = MAKERS["table"](tmp_path / "survey")
+    made = MAKERS["mcap"](tmp_path / "survey")
+    options = replace(AS_IT_IS, crs="EPSG:2154")
+    assert read_survey(table.parent, options).format == "table"
+    assert read_survey(table.parent, replace(options, no_pose=True)).format == "plain"
+    assert read_survey(made, AS_IT_IS).format == "mcap"
+    table.unlink()
+    picture(table.parent / "a.jpg")
+    with pytest.raises(BadSurvey, match=r"drive\.mcap is there: --format mcap reads"):
+        read_survey(table.parent, AS_IT_IS)
+    for name in ("a.jpg", "b.jpg"):
+        (table.parent / name).unlink()
+    assert read_survey(table.parent, AS_IT_IS).format == "mcap"
+
+
 def test_an_unknown_format_is_refused_and_the_known_ones_are_named(tmp_path: Path) -> None:
     with pytest.raises(
         BadConfig, match="stereopolis, mcap, kapture, table, utm-names, exif, plain"
@@ -185,6 +218,20 @@ def test_an_unknown_coordinate_system_is_refused(tmp_path: Path) -> None:
     picture(tmp_path / "a.jpg")
     with pytest.raises(UnknownCrs, match="EPSG:999999"):
         read_survey(tmp_path, ReadOptions(crs="EPSG:999999"))
+
+
+def test_what_becomes_of_positions_and_compass_headings_is_noted(tmp_path: Path) -> None:
+    rows = ["file,x,y,heading,time"]
+    for number, year in enumerate((2005, 2020)):
+        picture(tmp_path / f"{number}.jpg")
+        rows.append(f"{number}.jpg,{10 * number},0,90,{year}-05-01T10:00:00Z")
+    (tmp_path / "poses.csv").write_text("\n".join(rows) + "\n")
+    nameless = "+proj=tmerc +lat_0=48 +lon_0=2 +ellps=airy +units=m +no_defs +type=crs"
+    options = ReadOptions(crs=nameless, north="magnetic", allow_ballpark=True)
+    ballpark, magnetic = read_survey(tmp_path, options).notes
+    assert "off by up to hundreds of metres, as --allow-ballpark permits" in ballpark
+    assert magnetic.startswith("1 magnetic headings cannot be turned to true north: ")
+    assert read_survey(tmp_path, ReadOptions(crs="EPSG:32631", north="grid")).notes == ()
 
 
 def test_a_survey_reads_the_same_whatever_folder_it_is_in(tmp_path: Path) -> None:

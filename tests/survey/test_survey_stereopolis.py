@@ -159,7 +159,8 @@ def test_images_and_panoramas_without_each_other_are_skipped(tmp_path: Path) -> 
     assert "camera 999 is not in" in found["i/T-1-999-1_7.jpg"]
     assert "panorama 6 is not in" in found["i/T-1-301-1_6.jpg"]
     assert "more than once" in found["i/T-1-301-1_9.jpg"]
-    assert "heading is None" in found["i/T-1-301-1_10.jpg"]
+    broken = "panoramicsMetaData.json, panorama 10: heading is None"
+    assert broken in found["i/T-1-301-1_10.jpg"]
     assert "its name" in found["i/holiday.jpg"]
     assert "no image of panorama 8" in found["panoramicsMetaData.json#8"]
     # Of panoramas that cannot be placed or are told twice, the images say so already.

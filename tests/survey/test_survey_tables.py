@@ -183,8 +183,8 @@ def test_one_far_pose_among_good_ones_is_skipped(tmp_path: Path) -> None:
         ("here,6862000,1,2,3", "poses.csv row 3 column 'x': easting is 'here'"),
         ("652000,6862000,nan,2,3", "poses.csv row 3 column 'heading': heading is 'nan'"),
         ("652000,6862000,north,2,3", "poses.csv row 3 column 'heading': heading is 'north'"),
-        ("652000,6862000,1,91,3", "poses.csv row 3: pitch is 91"),
-        ("652000,6862000,1,2,-9999", "poses.csv row 3: altitude is -9999"),
+        ("652000,6862000,1,91,3", "poses.csv row 3 column 'pitch': pitch is 91"),
+        ("652000,6862000,1,2,-9999", "poses.csv row 3 column 'z': altitude is -9999"),
         ("652000", "poses.csv row 3: image without pose"),
     ],
 )

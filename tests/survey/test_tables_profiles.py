@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -306,9 +307,45 @@ def test_rows_in_several_systems_are_converted_into_the_most_frequent(tmp_path: 
     turn = (lon_deg - 3) * (math.sin(math.radians(48.858)) - 0.7256077650)
     assert converted.heading_deg == pytest.approx(10 + turn, abs=0.002)
     assert turn < -0.01
-    assert any("1 rows converted from EPSG:32631 to EPSG:2154" in note for note in survey.notes)
+    (note,) = survey.notes
+    assert note.startswith("poses.csv, 1 rows: converted from EPSG:32631 into EPSG:2154 by ")
+    assert "UTM zone 31N" in note
+    assert re.search(r"\((to \d+ m|of unknown accuracy)\)$", note)
     assert reasons(survey)["d.jpg"] == "poses.csv row 5 column 'crs': no coordinate system"
     assert "EPSG:999999" in reasons(survey)["e.jpg"]
+
+
+def test_a_row_s_altitude_from_another_level_is_dropped(tmp_path: Path) -> None:
+    rows = [
+        ["a.jpg", 652000, 6862000, 40, "EPSG:5698"],
+        ["b.jpg", 652010, 6862000, 40, "EPSG:5698"],
+        ["c.jpg", 449032.42, 5411920.63, 84, "EPSG:32631"],
+    ]
+    pictured(tmp_path, "c.jpg")
+    survey = read_survey(written(tmp_path, ["file", "x", "y", "z", "crs"], *rows), AS_IT_IS)
+    assert pose_of(survey).altitude_m == 40.0
+    assert pose_of(survey, "c.jpg").altitude_m is None
+    assert any("poses.csv, 1 rows: 1 altitudes dropped" in note for note in survey.notes)
+
+
+def test_a_row_s_system_of_unknown_accuracy_needs_the_user_s_word(tmp_path: Path) -> None:
+    rows = [["a.jpg", 652000, 6862000, 2154], ["b.jpg", 652010, 6862000, 2154]]
+    nameless = "+proj=utm +zone=31 +ellps=intl +units=m"
+    rows.append(["c.jpg", 449032.42, 5411920.63, nameless])
+    pictured(tmp_path, "c.jpg")
+    root = written(tmp_path, ["file", "x", "y", "crs"], *rows)
+    assert "--allow-ballpark" in reasons(read_survey(root, AS_IT_IS))["c.jpg"]
+    survey = read_survey(root, replace(AS_IT_IS, allow_ballpark=True))
+    assert pose_of(survey, "c.jpg").crs == "EPSG:2154"
+
+
+def test_a_column_that_says_an_impossible_angle_is_named(tmp_path: Path) -> None:
+    header = ["file", "lon", "lat", "Pitch[deg]"]
+    rows = [["a.jpg", 2.25, 48.85, 120], ["b.jpg", 2.25, 148.85, 0]]
+    with pytest.raises(BadSurvey, match=r"poses\.csv row 2 column 'Pitch\[deg\]': pitch is 120"):
+        read_survey(written(tmp_path, header, *rows[:1]), AS_IT_IS)
+    with pytest.raises(BadSurvey, match=r"poses\.csv row 2 column 'lat': longitude 2\.25"):
+        read_survey(written(tmp_path, header, *rows[1:]), AS_IT_IS)
 
 
 def test_a_system_in_the_table_that_the_user_contradicts_is_refused(tmp_path: Path) -> None:

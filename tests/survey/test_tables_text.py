@@ -28,6 +28,35 @@ def test_any_separator_is_found(tmp_path: Path, separator: str) -> None:
     assert (pose_of(survey).easting, pose_of(survey).heading_deg) == (652000.5, 90.0)
 
 
+@pytest.mark.parametrize("stated", ["sep=;", '"sep=;"', "\ufeffSEP=;\r"])
+def test_a_separator_that_excel_states_is_used(tmp_path: Path, stated: str) -> None:
+    survey = read(tmp_path, f"{stated}\nfile;x;y\na.jpg;652000,5;6862000\nb.jpg;;1\n")
+    assert pose_of(survey).easting == 652000.5
+    assert "poses.csv row 4" in reasons(survey)["b.jpg"]
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "words"),
+    [
+        ("file,x,y", "a.jpg;652000.5;6862000", "by semicolons, the header by commas"),
+        ("file,x,y", "a.jpg;652000,5;6862000,5", "by semicolons, the header by commas"),
+        ("file;x;y", "a.jpg,652000.5,6862000", "by commas, the header by semicolons"),
+        ("file\tx\ty", "a.jpg 652000.5 6862000", "by blanks, the header by tabs"),
+        ("file,x,y", "a.jpg\t652000.5\t6862000", "by tabs, the header by commas"),
+    ],
+)
+def test_rows_by_another_separator_than_the_header_are_refused(
+    tmp_path: Path, header: str, row: str, words: str
+) -> None:
+    with pytest.raises(BadSurvey, match=rf"poses\.csv, line 2: the rows are separated {words}"):
+        read(tmp_path, f"{header}\n{row}\n{row}\n")
+
+
+def test_another_separator_inside_cells_is_no_reason_to_refuse(tmp_path: Path) -> None:
+    survey = read(tmp_path, "file,x,y\na|b;c.jpg,652000,6862000\n", "a|b;c.jpg")
+    assert [image.uri for image in survey.images] == ["a|b;c.jpg"]
+
+
 def test_columns_may_come_in_any_order_and_case(tmp_path: Path) -> None:
     survey = read(tmp_path, "Heading,Y,note,FILE,X\n90,6862000,hello,a.jpg,652000\n")
     assert (pose_of(survey).easting, pose_of(survey).heading_deg) == (652000.0, 90.0)

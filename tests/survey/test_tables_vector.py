@@ -253,6 +253,27 @@ def test_results_beside_a_pose_table_are_not_taken_for_one(tmp_path: Path) -> No
     assert [image.uri for image in read_survey(root, L93).images] == ["a.jpg"]
 
 
+def test_results_given_as_the_survey_are_told_for_what_they_are(tmp_path: Path) -> None:
+    root = pictured(tmp_path, "a.jpg")
+    match = {"query": "photo.jpg", "rank": 1, "score": 3.5, "image": "a.jpg"}
+    feature = {"type": "Feature", "geometry": point(2, 48), "properties": match}
+    results = root / "results.geojson"
+    results.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    with pytest.raises(BadSurvey, match=r"results\.geojson: these are results of `flaneur locate`"):
+        read_survey(results, AS_IT_IS)
+    (root / "results.csv").write_text("query,rank,score,image,lon,lat\np.jpg,1,3.5,a.jpg,2,48\n")
+    with pytest.raises(BadSurvey, match=r"results\.csv: these are results of `flaneur locate`"):
+        read_survey(root / "results.csv", AS_IT_IS)
+
+
+@pytest.mark.parametrize("instead_of", ["0.jpg", "48"])
+def test_geojson_in_latin_1_is_refused_as_no_utf_8(tmp_path: Path, instead_of: str) -> None:
+    path = pictured(tmp_path, "a.jpg") / "p.geojson"
+    path.write_bytes(features([point(2, 48)]).encode().replace(instead_of.encode(), b"\xe9"))
+    with pytest.raises(BadSurvey, match=r"p\.geojson is not UTF-8; save it as UTF-8$"):
+        read_survey(path, AS_IT_IS)
+
+
 def test_areas_that_name_a_file_are_not_taken_for_poses(tmp_path: Path) -> None:
     import geopandas
 
