@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from coordinator.export.geopackage import write_geopackage
 from coordinator.export.page import write_page
 from coordinator.export.sheets import QuerySheet, SheetMatch, thumbnail_jpeg
 from coordinator.indexing import IndexReport, Progress, run_job
-from coordinator.plan import make_plan, read_surveys
+from coordinator.plan import Intake, make_plan, read_surveys
 from coordinator.querying import Located, locate_photos
 from geo.crs import ToWgs84
 from geo.frames import LocalMetres
@@ -32,6 +32,7 @@ SHARD_SIZE = 8
 RIGHT_WITHIN_M = 25.0
 THUMBNAIL_PX = 240
 SHOWN = 5
+ATTRIBUTION = "Survey and photos rendered by Flaneur"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ def run_demo(
     progress.begin("render", 1, 0)
     demo = render_survey(out, options=shots)
     progress.advance("render")
-    intake = read_surveys([("", demo.survey.absolute())], ReadOptions(crs=demo.crs))
+    intake = _attributed(read_surveys([("", demo.survey.absolute())], ReadOptions(crs=demo.crs)))
     root = (out / "index").absolute()
     job, plan = make_plan(root, intake, CONFIG, SHARD_SIZE)
     report = run_job(job, plan, intake, nullcontext(engine), progress)
@@ -110,7 +111,7 @@ def run_demo(
         "Flaneur: old photos of a town that never was",
         feature_collection(features),
         [judge.sheet(row, located) for row, located in zip(rows, fused, strict=True)],
-        attribution="Survey and photos rendered by Flaneur",
+        attribution=ATTRIBUTION,
         track=judge.track(),
         truth={
             photo: judge.lon_lat(query) for photo, query in zip(photos, demo.truth, strict=True)
@@ -118,6 +119,15 @@ def run_demo(
     )
     seconds = float(np.mean([located.seconds for located in fused]))
     return DemoReport(report, rows, seconds, page, geojson, geopackage)
+
+
+def _attributed(intake: Intake) -> Intake:
+    """The survey names who made it, as every result then does."""
+    surveys = tuple(
+        replace(named, survey=replace(named.survey, attribution=ATTRIBUTION))
+        for named in intake.surveys
+    )
+    return replace(intake, surveys=surveys)
 
 
 class _Judge:

@@ -9,7 +9,7 @@ import typer
 
 from contracts.errors import BadConfig
 from coordinator.cli.lists import SOME_SKIPPED
-from coordinator.cli.outputs import result_file, result_folder, utf_8
+from coordinator.cli.outputs import refuse_inside, result_file, result_folder, utf_8
 from coordinator.cli.show import stdout, tell
 from coordinator.cli.survey_options import (
     AllowBallpark,
@@ -64,6 +64,9 @@ def command(
 
     folder = None if out is None else result_folder(out)
     drawing = None if picture is None else _png(picture)
+    for option, place in (("--out", out), ("--picture", picture)):
+        if place is not None:
+            refuse_inside(survey, place, option)
     options = ReadOptions(
         crs=crs,
         north=north,

@@ -51,7 +51,12 @@ def command(
     """Find where photos were taken."""
     from coordinator.engine import running_engine
     from coordinator.export.geojson import encoded, provenance
-    from coordinator.export.results import features_of, refuse_unknown, write_results
+    from coordinator.export.results import (
+        features_of,
+        refuse_unknown,
+        refuse_unwritable,
+        write_results,
+    )
     from coordinator.querying import locate_photos
     from index.opened import OpenedIndex
 
@@ -61,6 +66,7 @@ def command(
     photos = list(dict.fromkeys(photos))  # globs overlap; a feature's id is of its photo's name
     outs = [result_file(each, map(Path, photos)) for each in out or ()]
     refuse_unknown(outs)
+    refuse_unwritable(outs)
     about = provenance(opened)
     tally = _Tally()
     count = min(workers or len(photos), len(photos)) if broker is None else None

@@ -44,6 +44,22 @@ def result_folder(out: Path) -> Path:
     return folder
 
 
+def refuse_inside(survey: Path, out: Path, option: str) -> None:
+    """A picture in a survey's folder would be an image of the survey the next time.
+
+    Raises
+    ------
+    WrongInput : `out` lies in the folder of `survey`, which may be a pose table in it.
+    """
+    recording = survey.suffix.lower() == ".mcap"
+    folder = survey.parent if survey.is_file() and not recording else survey
+    if out.resolve().is_relative_to(folder.resolve()):
+        raise WrongInput(
+            f"{option} {out} lies in the survey's own folder {folder}, where its picture would be "
+            "taken for an image of the survey; name a place outside it."
+        )
+
+
 def _refuse_under_a_file(out: Path, path: Path) -> None:
     above = next(parent for parent in path.parents if parent.exists())
     if not above.is_dir():

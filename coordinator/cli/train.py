@@ -58,6 +58,7 @@ def command(
     from index.opened import OpenedIndex
     from workers.stages.choose import KS
 
+    variants = _variants(variant)
     search = search_config("auto", "auto", vote, weights, descriptors, top=10)
     opened = OpenedIndex(index.absolute())
     search = fitted_search(search, vote, opened.config.features)
@@ -78,9 +79,7 @@ def command(
             engine.follower,
             lambda: progress.advance("train"),
         )
-    model = train_model(
-        answers, queries, opened, search, truth.absolute().parent.name, _variants(variant)
-    )
+    model = train_model(answers, queries, opened, search, truth.absolute().parent.name, variants)
     if out is None:
         write_model(opened.root, model)
     else:

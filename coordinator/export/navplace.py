@@ -106,7 +106,7 @@ def _estimates(features: Iterable[Json]) -> Iterator[tuple[str, Json | None, str
         if properties["kind"] == "estimate" and properties.get("in_survey") is not False:
             estimates[query] = (feature, "")
         elif properties["kind"] == "estimate":
-            estimates[query] = (None, "it is probably not in the survey")
+            estimates[query] = (None, "nothing in the survey stands out as its place")
         elif properties["kind"] == "error":
             estimates[query] = (None, str(properties["error"]))
         else:

@@ -38,6 +38,17 @@ def refuse_unknown(outs: Sequence[Path]) -> None:
             raise WrongInput(f"--out names {out} twice; once is enough.")
 
 
+def refuse_unwritable(outs: Iterable[Path]) -> None:
+    """Try whether each can be written, before the work.
+
+    Raises
+    ------
+    WrongInput : a file cannot be made in the folder of one.
+    """
+    for folder in dict.fromkeys(out.parent for out in outs):
+        _scratch(folder).close()
+
+
 def write_results(
     outs: Sequence[Path],
     answers: Iterable[Located],
@@ -48,13 +59,14 @@ def write_results(
     """Write every answer into each of `outs`, which `refuse_unknown` has passed.
 
     The first, a GeoJSON if there is one, is written as the answers come, the others after it. A
-    file has its name only when it is whole. If it ends early, by Ctrl-C or a failure, and no
-    GeoJSON is whole yet, the answers there are go into `NAME.partial.geojson` beside the first.
+    file has its name only when it is whole. If it ends early, by Ctrl-C or a failure, it is told
+    which are; if no GeoJSON is, the answers there are go into `NAME.partial.geojson` beside the
+    first.
 
     Parameters
     ----------
     outs : files, their endings of `FORMATS`. about : of the GeoJSON (`provenance`).
-    tell : called with a sentence that says where answers were kept.
+    tell : called with a sentence that says what is whole, or where answers were kept.
 
     Raises
     ------
@@ -69,6 +81,8 @@ def write_results(
                 _write(out, kept if whole else kept.keep(answers), index, about)
                 whole.append(out)
         except BaseException:
+            if whole:
+                tell(f"Written whole before it ended: {', '.join(map(str, whole))}")
             if len(kept) and not any(map(_is_geojson, whole)):
                 tell(_keep_partial(ordered[0], kept, about))
             raise

@@ -30,7 +30,9 @@ def test_every_query_is_answered_three_ways(report: DemoReport) -> None:
 
 
 def test_the_geojson_holds_matches_and_estimates_of_every_query(report: DemoReport) -> None:
-    features = json.loads(report.geojson.read_text())["features"]
+    written = json.loads(report.geojson.read_text())
+    assert written["flaneur"]["attribution"] == ["Survey and photos rendered by Flaneur"]
+    features = written["features"]
     for kind in ("match", "estimate"):
         found = {
             each["properties"]["query"] for each in features if each["properties"]["kind"] == kind

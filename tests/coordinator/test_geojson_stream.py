@@ -13,7 +13,7 @@ from contracts.config import SearchConfig
 from contracts.errors import BadConfig, TaskFailed, WrongInput
 from coordinator import querying
 from coordinator.export.geojson import write_geojson
-from coordinator.export.results import refuse_unknown, write_results
+from coordinator.export.results import refuse_unknown, refuse_unwritable, write_results
 from coordinator.follow import Follower, Order, Outcome
 from coordinator.querying import Located, locate_photos
 from geo.geojson import Feature, PlacedMatch, error_feature, match_feature
@@ -136,7 +136,7 @@ def test_an_output_that_fails_after_another_is_whole_costs_nothing(tmp_path: Pat
         write_results([good, folder], answers(2), NO_INDEX, ABOUT, said.append)
     assert len(json.loads(good.read_bytes())["features"]) == 4
     assert set(tmp_path.iterdir()) == {good, folder}
-    assert said == []
+    assert said == [f"Written whole before it ended: {good}"]
 
 
 def test_where_the_answers_cannot_be_kept_that_is_said(tmp_path: Path) -> None:
@@ -187,6 +187,8 @@ def test_a_place_where_nothing_can_be_written_is_told_before_the_work(tmp_path: 
     with pytest.raises(WrongInput, match="cannot write into"):
         write_results([out], coming(), NO_INDEX, ABOUT, lambda _: None)
     assert asked == []
+    with pytest.raises(WrongInput, match="cannot write into"):
+        refuse_unwritable([tmp_path / "a.geojson", out])
 
 
 @pytest.mark.parametrize(

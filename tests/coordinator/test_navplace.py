@@ -170,7 +170,7 @@ def test_what_is_on_no_canvas_is_said() -> None:
         "gone.jpg": "no canvas has its name",
         "twice.jpg": "2 canvases have its name; rename the photo as the image of its canvas",
         "old.jpg": "its canvas has a navPlace already, which is kept",
-        "elsewhere.jpg": "it is probably not in the survey",
+        "elsewhere.jpg": "nothing in the survey stands out as its place",
         "broken.jpg": "truncated",
         "vague.jpg": "there is no estimate of its place",
     }

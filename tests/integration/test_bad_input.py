@@ -200,6 +200,7 @@ def test_a_table_of_many_missing_images_is_summed_up(tmp_path: Path) -> None:
         (("--out", "FILE/x.geojson"), "is a file"),
         (("--out", "PHOTO"), "is one of the inputs"),
         (("--out", "/dev/null"), "no regular file"),
+        (("--out", "PHOTO.geojson", "--out", "/proc/none/x.kml"), "cannot write into /proc/none"),
     ],
 )
 def test_a_search_that_makes_no_sense_is_refused_before_the_work(

@@ -115,11 +115,11 @@ def test_queries_of_one_place_cannot_be_compared(
 
 
 def test_training_writes_a_model_that_says_what_it_is_made_of(
-    opened: OpenedIndex, truth: Path, tmp_path: Path
+    opened: OpenedIndex, truth: Path, tmp_path: Path, engine: Engine
 ) -> None:
     out = tmp_path / "choice.json"
     command = ("train", "--index", opened.root, "--truth", truth, "--variant", "gain")
-    done = flaneur_command.run(*command, "--out", out, "--workers", "1")
+    done = flaneur_command.run(*command, "--out", out, "--broker", engine.app.conf.broker_url)
     assert done.returncode == 0, done.stderr
     model = ChoiceModel.from_json(out.read_text(encoding="utf-8"))
     assert model.variant == "gain"
@@ -130,9 +130,11 @@ def test_training_writes_a_model_that_says_what_it_is_made_of(
     assert all(each.low <= each.value <= each.high for each in model.coefficients)
 
 
-def test_an_unknown_variant_is_refused_by_name(opened: OpenedIndex, truth: Path) -> None:
+def test_an_unknown_variant_is_refused_by_name_before_the_work(
+    opened: OpenedIndex, truth: Path
+) -> None:
     command = ("train", "--index", opened.root, "--truth", truth, "--variant", "magic")
-    done = flaneur_command.run(*command)
+    done = flaneur_command.run(*command, "--broker", "redis://127.0.0.1:9")  # nobody is there
     assert done.returncode == 2
     assert "--variant takes auto or one of fixed, eq1," in done.stderr
 

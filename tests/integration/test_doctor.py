@@ -83,6 +83,19 @@ def test_a_report_is_a_folder_with_a_map(survey: Path, tmp_path: Path) -> None:
         assert picture.width > 800
 
 
+@pytest.mark.parametrize("option", [("--out", "report"), ("--picture", "maps/track.png")])
+@pytest.mark.parametrize("read", ["", "poses.csv"])
+def test_a_picture_in_the_survey_s_own_folder_is_refused(
+    survey: Path, option: tuple[str, str], read: str
+) -> None:
+    before = sorted(survey.iterdir())
+    name, value = option
+    code, stdout, stderr = doctor(survey / read, "--crs", "EPSG:2154", name, survey / value)
+    assert (code, stdout) == (2, "")
+    assert f"{name} {survey / value} lies in the survey's own folder" in " ".join(stderr.split())
+    assert sorted(survey.iterdir()) == before
+
+
 def test_a_picture_of_nothing_is_said(survey: Path, tmp_path: Path) -> None:
     code, _, stderr = doctor(survey, "--no-pose", "--picture", tmp_path / "track.png")
     assert code == 0

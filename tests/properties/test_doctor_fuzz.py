@@ -9,6 +9,7 @@ from contracts.records import Camera, Pose, PosedImage, Skipped
 from survey.doctor.duplicates import check_files_twice
 from survey.doctor.examination import CHECKS_OF_TRACK
 from survey.doctor.figures import figures_of
+from survey.doctor.heights import check_heights
 from survey.doctor.pairing import check_skipped
 from survey.doctor.systems import likely_systems
 from survey.doctor.times import check_times
@@ -52,6 +53,7 @@ def test_any_survey_is_examined(parts: list[tuple[Pose, str, str | None]]) -> No
     track = track_of(images, "EPSG:4326")
     figures_of(images, 0, track)
     found = [finding for check in CHECKS_OF_TRACK for finding in check(track)]
+    found += check_heights(track, "table")
     found += [*check_times(images, NOW), *check_files_twice(images)]
     uris = {image.uri for image in images}
     assert all(finding.what and set(finding.uris) <= uris for finding in found)
