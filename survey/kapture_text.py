@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from contracts.errors import BadSurvey
 from contracts.records import Camera
 from geo.rotations import rotations_from_quaternions
+from survey.poses import finite_number
 
 _PARTS = ("qw", "qx", "qy", "qz", "tx", "ty", "tz")
 # Camera models of COLMAP whose middle of the picture is a pinhole's: where cx stands among the
@@ -91,7 +92,7 @@ def pose_numbers(cells: list[str]) -> list[float]:
     missing += _PARTS[len(cells) :]
     if missing:
         raise ValueError(f"a partial pose without {', '.join(missing)}")
-    numbers = [_number(name, cell) for name, cell in zip(_PARTS, cells, strict=False)]
+    numbers = [finite_number(name, cell) for name, cell in zip(_PARTS, cells, strict=False)]
     if not math.hypot(*numbers[:4]) > 0.0:
         raise ValueError("quaternion 0, 0, 0, 0 is no rotation")
     return numbers
@@ -115,7 +116,7 @@ def camera(sensor_id: str, cells: list[str]) -> Camera:
     ValueError : parameters that cannot be.
     """
     model, texts = (cells[3] if len(cells) > 3 else ""), cells[4:]
-    numbers = [_number(f"parameter {at + 1}", text) for at, text in enumerate(texts) if text]
+    numbers = [finite_number(f"parameter {at + 1}", text) for at, text in enumerate(texts) if text]
     if len(numbers) < 2:
         return Camera(sensor_id)
     width, height = numbers[:2]
@@ -130,13 +131,3 @@ def camera(sensor_id: str, cells: list[str]) -> Camera:
         left, right = math.atan(centre / focal), math.atan((width - centre) / focal)
         hfov_deg = math.degrees(left + right)
     return Camera(sensor_id, hfov_deg, int(width), int(height))
-
-
-def _number(name: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f"{name} is {text[:40]!r}, expected a number")
-    return number

@@ -122,3 +122,14 @@ def outside_area(poses: Sequence[Pose], crs: str) -> NDArray[np.bool_]:
         & (lat <= area.north + _AREA_MARGIN_DEG)
     )
     return np.asarray(~inside)
+
+
+def finite_number(name: str, text: str) -> float:
+    """The number that a piece of text is; ValueError says what `name` is instead."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {text[:40]!r}, expected a number")
+    return number

@@ -11,6 +11,7 @@ from contracts.errors import BadConfig, BadSurvey
 from survey import exif, kapture, mcap, plain, stereopolis, tables, utm_names
 from survey.files import list_images
 from survey.options import Reader, ReadOptions
+from survey.poses import crs_name
 
 
 def _recognises_mcap(path: Path) -> bool:
@@ -36,8 +37,20 @@ def choose_reader(path: Path, options: ReadOptions) -> Reader:
 
     Raises
     ------
-    BadConfig : no reader of that name. BadSurvey : no reader knows the path.
+    BadConfig : no reader of that name. BadSurvey : nothing is there, or no reader knows it.
+    UnknownCrs : `options.crs` is no coordinate system.
     """
+    if options.crs is not None:
+        crs_name(options.crs)
+    try:
+        if not path.exists():
+            raise BadSurvey(f"survey {path} does not exist; check the path")
+        return _chosen(path, options)
+    except OSError as error:
+        raise BadSurvey(f"survey {path} cannot be looked into: {error.strerror}") from error
+
+
+def _chosen(path: Path, options: ReadOptions) -> Reader:
     names = ", ".join(reader.name for reader in READERS)
     if options.format is not None:
         for reader in READERS:

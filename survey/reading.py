@@ -13,7 +13,7 @@ from geo.crs import ToWgs84
 from survey.caveats import caveats
 from survey.options import Reading, ReadOptions, Survey, selector
 from survey.panorama import cut_panoramas
-from survey.poses import crs_name, outside_area
+from survey.poses import outside_area
 from survey.readers import choose_reader
 from survey.track import with_track_headings
 
@@ -31,14 +31,7 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
         conversion to WGS 84. BadConfig : `options.format` names no reader.
     """
     path = Path(path)
-    if options.crs is not None:
-        crs_name(options.crs)
-    try:
-        if not path.exists():
-            raise BadSurvey(f"survey {path} does not exist; check the path")
-        reader = choose_reader(path, options)
-    except OSError as error:
-        raise BadSurvey(f"survey {path} cannot be looked into: {error.strerror}") from error
+    reader = choose_reader(path, options)
     wanted = selector(options)
     reading = reader.read(path, options, wanted)
     if options.no_pose:

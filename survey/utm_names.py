@@ -6,7 +6,6 @@ the timestamp, which has no zone, and the height, since nobody says from what it
 true, as in the street views that these datasets are made of; `north` overrides.
 """
 
-import math
 import os
 from collections import defaultdict
 from collections.abc import Callable, Sequence
@@ -21,7 +20,7 @@ from contracts.records import Pose, PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.files import is_image_name, list_images
 from survey.options import Reader, Reading, ReadOptions
-from survey.poses import crs_name, normalised, pose_problem
+from survey.poses import crs_name, finite_number, normalised, pose_problem
 
 _N_FIELDS = 14
 _NORTHERN, _SOUTHERN = "NPQRSTUVWX", "CDEFGHJKLM"
@@ -88,12 +87,12 @@ def _pose(name: str, north: North) -> Pose | str:
         if not (east and north_m):
             raise ValueError("image without pose: its name has no UTM position")
         pose = Pose(
-            easting=_number("UTM easting", east),
-            northing=_number("UTM northing", north_m),
+            easting=finite_number("UTM easting", east),
+            northing=finite_number("UTM northing", north_m),
             crs=_zone_crs(zone, letter, latitude),
-            heading_deg=_number("heading", fields[8]) if fields[8] else None,
-            pitch_deg=_number("pitch", fields[9]) if fields[9] else None,
-            roll_deg=_number("roll", fields[10]) if fields[10] else None,
+            heading_deg=finite_number("heading", fields[8]) if fields[8] else None,
+            pitch_deg=finite_number("pitch", fields[9]) if fields[9] else None,
+            roll_deg=finite_number("roll", fields[10]) if fields[10] else None,
             north=north,
         )
     except ValueError as error:
@@ -106,7 +105,7 @@ def _zone_crs(zone: str, letter: str, latitude: str) -> str:
     number = int(zone) if zone.isascii() and zone.isdigit() and len(zone) < 4 else 0
     if not 1 <= number <= 60:
         raise ValueError(f"UTM zone is {zone!r}, expected 1 to 60")
-    north = _number("latitude", latitude) >= 0.0 if latitude else None
+    north = finite_number("latitude", latitude) >= 0.0 if latitude else None
     if letter:
         if letter.upper() not in _NORTHERN + _SOUTHERN or len(letter) > 1:
             raise ValueError(f"UTM band is {letter!r}, expected a letter C to X without I and O")
@@ -117,16 +116,6 @@ def _zone_crs(zone: str, letter: str, latitude: str) -> str:
     if north is None:
         raise ValueError("neither UTM band nor latitude says which hemisphere it is")
     return f"EPSG:{326 if north else 327}{number:02d}"
-
-
-def _number(name: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f"{name} is {text!r}, expected a number")
-    return number
 
 
 def _refuse_one_grid(

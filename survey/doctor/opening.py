@@ -3,12 +3,11 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from contracts.errors import BadSurvey, UnknownCrs, WrongInput
+from contracts.errors import UnknownCrs, WrongInput
 from contracts.records import PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.doctor.findings import Finding
 from survey.options import Reader, Reading, ReadOptions, selector
-from survey.poses import crs_name
 from survey.readers import choose_reader
 from survey.reading import why_empty
 
@@ -43,14 +42,7 @@ def open_survey(path: Path, options: ReadOptions) -> Opened:
     BadSurvey : nothing is there, or no reader knows it. BadConfig : no reader of that name.
     UnknownCrs : `options.crs` is no coordinate system.
     """
-    if options.crs is not None:
-        crs_name(options.crs)
-    try:
-        if not path.exists():
-            raise BadSurvey(f"survey {path} does not exist; check the path")
-        reader = choose_reader(path, options)
-    except OSError as error:
-        raise BadSurvey(f"survey {path} cannot be looked into: {error.strerror}") from error
+    reader = choose_reader(path, options)
     try:
         reading = _read(reader, path, options)
     except WrongInput as error:
