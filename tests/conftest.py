@@ -1,6 +1,7 @@
 """What many tests need: real data where it is, a small survey, a running engine."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
@@ -22,6 +23,9 @@ from index.opened import OpenedIndex
 from survey import ReadOptions
 
 REPOSITORY = Path(__file__).parents[1]
+
+# A shell ignores Ctrl-C for what it starts in the background, and so would the commands tested.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
