@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from contracts.errors import BadConfig
+from contracts.faults import first_fault
 
 Detector = Literal["hesaff", "mser", "star", "har", "orb", "colsym"]
 Descriptor = Literal["sift", "surf", "sc"]
@@ -37,9 +38,8 @@ class _Frozen(BaseModel):
         try:
             return cls.model_validate(settings)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"])
-            message = first["msg"].removeprefix("Value error, ")
+            where, what = first_fault(error)
+            message = what.removeprefix("Value error, ")
             raise BadConfig(f"{where}: {message}" if where else message) from error
 
     def digest(self) -> str:

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from contracts.errors import BadIndex, WrongInput
+from contracts.faults import first_fault
 
 LEAST_IMAGES = 30
 """A ranking of fewer has no bulk that anything could stand out from."""
@@ -124,10 +125,9 @@ class PlacingModel(Record):
         try:
             return cls.model_validate_json(text)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"]) or "its beginning"
+            where, what = first_fault(error)
             raise BadIndex(
-                f"the model of certainty does not hold at {where}: {first['msg']}. "
+                f"the model of certainty does not hold at {where or 'its beginning'}: {what}. "
                 "Install Flaneur again."
             ) from error
 

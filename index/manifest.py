@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from contracts.config import IndexConfig
 from contracts.errors import BadIndex
+from contracts.faults import first_fault
 from index.files import write_bytes
 
 FORMAT_VERSION = 2
@@ -103,9 +104,8 @@ def live_generation(root: Path) -> Generation:
     try:
         return Generation.model_validate(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise BadIndex(f"{path}: {where}: {first['msg']}. Restore it or index again.") from error
+        where, what = first_fault(error)
+        raise BadIndex(f"{path}: {where}: {what}. Restore it or index again.") from error
 
 
 def _why_not_an_index(root: Path) -> str:

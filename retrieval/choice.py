@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from contracts.config import MAX_NEIGHBOURS, Descriptor, Detector, VariantName, Vote, Weight
 from contracts.errors import BadIndex, WrongInput
+from contracts.faults import first_fault
 from retrieval.candidates import FEATURES, Candidate, Pair
 from retrieval.regression import (
     VARIANTS,
@@ -156,10 +157,9 @@ class ChoiceModel(Record):
         try:
             return cls.model_validate_json(text)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(str(part) for part in first["loc"]) or "its beginning"
+            where, what = first_fault(error)
             raise BadIndex(
-                f"the adaptive model does not hold at {where}: {first['msg']}. "
+                f"the adaptive model does not hold at {where or 'its beginning'}: {what}. "
                 "Restore it or run `flaneur train` again."
             ) from error
 

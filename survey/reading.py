@@ -11,7 +11,7 @@ from contracts.errors import BadSurvey
 from contracts.records import Pose, PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.caveats import caveats
-from survey.options import Reading, ReadOptions, Survey, selector
+from survey.options import Reader, Reading, ReadOptions, Survey, selector
 from survey.panorama import cut_panoramas
 from survey.poses import outside_area
 from survey.readers import choose_reader
@@ -32,12 +32,7 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
     """
     path = Path(path)
     reader = choose_reader(path, options)
-    wanted = selector(options)
-    reading = reader.read(path, options, wanted)
-    if options.no_pose:
-        bare = tuple(replace(image, pose=None) for image in reading.images)
-        reading = replace(reading, images=bare, crs=None)
-    reading = _only(reading, wanted)
+    reading = read_wanted(reader, path, options)
     if reading.crs is not None:
         reading = _inside_area(reading, path)
         reading = _with_caveats(reading, options)
@@ -83,11 +78,23 @@ def _with_headings(reading: Reading) -> Reading:
     return replace(reading, images=images, notes=(*reading.notes, note))
 
 
-def _only(reading: Reading, wanted: Callable[[str], bool]) -> Reading:
+def read_wanted(reader: Reader, path: Path, options: ReadOptions) -> Reading:
+    """What a reader finds of what is asked for, with poses if they are wanted; not yet judged.
+
+    Raises
+    ------
+    BadSurvey, UnknownCrs : as the reader does.
+    """
+    wanted = selector(options)
+    reading = reader.read(path, options, wanted)
+    images = [image for image in reading.images if wanted(image.uri)]
+    if options.no_pose:
+        images = [replace(image, pose=None) for image in images]
     return replace(
         reading,
-        images=tuple(image for image in reading.images if wanted(image.uri)),
+        images=tuple(images),
         skipped=tuple(skip for skip in reading.skipped if wanted(skip.uri)),
+        crs=None if options.no_pose else reading.crs,
     )
 
 

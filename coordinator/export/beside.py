@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError
 
-from contracts.errors import WrongInput
+from coordinator.export.files import cannot_write
 from index.files import sync_folder
 
 # pyarrow raises OSError.
@@ -47,7 +47,4 @@ def writing_to(out: Path) -> Iterator[None]:
         yield
     except _WRITING_FAILED as error:
         reason = getattr(error, "strerror", None) or error
-        raise WrongInput(
-            f"cannot write {out}: {reason}; name a file (not a folder) where there is room and "
-            "leave to write (--out)"
-        ) from error
+        raise cannot_write(out, reason) from error

@@ -29,7 +29,12 @@ def write_pieces(out: Path, pieces: Iterable[bytes]) -> None:
     try:
         write_atomic(out, lambda stream: stream.writelines(pieces))
     except OSError as error:
-        raise WrongInput(
-            f"cannot write {out}: {error.strerror}; name a file (not a folder) where there is "
-            "room and leave to write (--out)"
-        ) from error
+        raise cannot_write(out, error.strerror) from error
+
+
+def cannot_write(out: Path, reason: object) -> WrongInput:
+    """What a person is told of a file that a system or a library would not write."""
+    return WrongInput(
+        f"cannot write {out}: {reason}; name a file (not a folder) where there is room and leave "
+        "to write (--out)"
+    )

@@ -7,9 +7,9 @@ from contracts.errors import UnknownCrs, WrongInput
 from contracts.records import PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.doctor.findings import Finding
-from survey.options import Reader, Reading, ReadOptions, selector
+from survey.options import Reader, Reading, ReadOptions
 from survey.readers import choose_reader
-from survey.reading import why_empty
+from survey.reading import read_wanted, why_empty
 
 _BARE_NUMBERS = "EPSG:3857"
 """Any projected system will do to read numbers whose own system is not known."""
@@ -44,7 +44,7 @@ def open_survey(path: Path, options: ReadOptions) -> Opened:
     """
     reader = choose_reader(path, options)
     try:
-        reading = _read(reader, path, options)
+        reading = read_wanted(reader, path, options)
     except WrongInput as error:
         refusal = Finding("refused", "error", str(error), mend=_mend(error))
         return _opened(path, reader, _bare(reader, path, options), (refusal,), bare=True)
@@ -75,24 +75,10 @@ def _opened(
     )
 
 
-def _read(reader: Reader, path: Path, options: ReadOptions) -> Reading:
-    wanted = selector(options)
-    reading = reader.read(path, options, wanted)
-    images = [image for image in reading.images if wanted(image.uri)]
-    if options.no_pose:
-        images = [replace(image, pose=None) for image in images]
-    return replace(
-        reading,
-        images=tuple(images),
-        skipped=tuple(skip for skip in reading.skipped if wanted(skip.uri)),
-        crs=None if options.no_pose else reading.crs,
-    )
-
-
 def _bare(reader: Reader, path: Path, options: ReadOptions) -> Reading:
     """The survey with its coordinates as mere numbers, or empty where that fails as well."""
     try:
-        return _read(reader, path, replace(options, crs=_BARE_NUMBERS))
+        return read_wanted(reader, path, replace(options, crs=_BARE_NUMBERS))
     except WrongInput:
         return Reading((), (), None)
 
