@@ -3,10 +3,12 @@
 import hashlib
 import json
 from itertools import combinations
+from math import isfinite
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from contracts.dates import span_of
 from contracts.errors import BadConfig
 from contracts.faults import first_fault
 
@@ -91,7 +93,10 @@ class CodebookConfig(_Frozen):
 
     codebook_ratio: Annotated[float, Field(gt=0, le=1)] = 0.2
     max_words: Annotated[int, Field(ge=1, le=1_000_000)] = 20_000
-    max_train_points: Annotated[int, Field(ge=1)] = 1_000_000
+    max_train_points: Annotated[int, Field(ge=1)] = Field(
+        default_factory=lambda given: max(1_000_000, 4 * given.get("max_words", 0))
+    )
+    """Descriptors that words are made from: a million, or four a word where that is more."""
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
 
 
@@ -100,6 +105,53 @@ class IndexConfig(_Frozen):
 
     features: FeatureConfig = FeatureConfig()
     codebooks: CodebookConfig = CodebookConfig()
+
+
+class Where(_Frozen):
+    """Which images of an index are meant: those for which every condition given holds.
+
+    An image that does not say (no pose, no date) is not meant where it is asked.
+    """
+
+    bbox: tuple[float, float, float, float] | None = None
+    """West, south, east, north in WGS 84 degrees; west may lie east of east, across 180."""
+    polygon: Annotated[str, Field(max_length=1_000_000)] | None = None
+    """WKT of a polygon or several, WGS 84 longitude and latitude (geo/regions.py)."""
+    since: str | None = None
+    until: str | None = None
+    """ISO 8601; a day, month or year `until` counts to its end; without a zone: UTC."""
+    heading: tuple[float, float] | None = None
+    """Degrees clockwise from true north, and how far to either side."""
+    surveys: tuple[str, ...] = ()
+    """As the catalogue names them: the main survey is ""."""
+    uris: tuple[str, ...] = ()
+    """Uris, or globs of them (contracts/globs.py)."""
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if self.bbox is not None:
+            _check_bbox(*self.bbox)
+        if self.heading is not None:
+            middle, reach = self.heading
+            if not (isfinite(middle) and 0.0 <= reach <= 180.0):
+                raise ValueError(
+                    "a heading takes a direction and 0 to 180 degrees to either side, such as "
+                    f"180±45; got {middle:g}±{reach:g}"
+                )
+        since = None if self.since is None else span_of(self.since)[0]
+        until = None if self.until is None else span_of(self.until)[1]
+        if since is not None and until is not None and until <= since:
+            raise ValueError(f"until {self.until} lies before since {self.since}; swap them")
+        return self
+
+
+def _check_bbox(west: float, south: float, east: float, north: float) -> None:
+    on_earth = all(-180.0 <= lon <= 180.0 for lon in (west, east))
+    if not (on_earth and -90.0 <= south <= north <= 90.0):
+        raise ValueError(
+            "a box takes west,south,east,north in degrees of longitude and latitude, such as "
+            f"2.33,48.85,2.35,48.86; got {west:g},{south:g},{east:g},{north:g}"
+        )
 
 
 class SearchConfig(_Frozen):
@@ -121,6 +173,9 @@ class SearchConfig(_Frozen):
     union_distance: UnionDistance = "sum"
     """A cell of L words is as far as the sum of their d', so that a vote may be negative down to
     1 - L, or as their mean (`union` only; the same for one descriptor)."""
+
+    where: Where = Where()
+    """Only these images are candidates."""
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:

@@ -105,6 +105,27 @@ class Postings:
 
 
 @dataclass(frozen=True, slots=True)
+class PackedPostings:
+    """An inverted index of one channel as it is stored, a word's images packed into bytes.
+
+    offsets : (n_words + 1,) int64, where each word's bytes begin. counts : (n_words,) uint32,
+    images of each word. packed : (n_bytes,) uint8; retrieval/packing.py.
+    """
+
+    offsets: NDArray[np.int64]
+    counts: NDArray[np.uint32]
+    packed: NDArray[np.uint8]
+
+    @property
+    def n_words(self) -> int:
+        return len(self.counts)
+
+    @property
+    def n_postings(self) -> int:
+        return int(self.counts.sum(dtype=np.int64))
+
+
+@dataclass(frozen=True, slots=True)
 class Match:
     """One image of a ranking. rank : 1 = best."""
 
@@ -117,7 +138,7 @@ class Match:
 class Receipt:
     """Proof that one task of a job is done: what it wrote, and how much.
 
-    outputs : relative path in the job's folder -> sha256. counts : totals to add up.
+    outputs : path relative to the index -> sha256. counts : totals to add up.
     """
 
     stage: str

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
+from contracts.progress import Progress
 from coordinator.engine import Engine
 from coordinator.export.geojson import provenance, write_geojson
 from coordinator.export.geopackage import write_geopackage
 from coordinator.export.page import write_page
 from coordinator.export.sheets import QuerySheet, SheetMatch, thumbnail_jpeg
-from coordinator.indexing import IndexReport, Progress, run_job
-from coordinator.plan import Intake, make_plan, read_surveys
+from coordinator.indexing import IndexReport, run_job
+from coordinator.intake import Intake, read_surveys
+from coordinator.plan import make_plan
 from coordinator.querying import Located, locate_photos
 from geo.crs import ToWgs84
 from geo.frames import LocalMetres
@@ -138,7 +140,9 @@ class _Judge:
         self._to_wgs84 = ToWgs84(demo.crs)
         self._uris = index.catalogue.column("uri")
         self._paths = index.catalogue.column("path")
-        self._positions = index.catalogue.positions()
+        self._positions = np.column_stack(
+            [index.catalogue.numbers("easting"), index.catalogue.numbers("northing")]
+        )
         self._chance = np.random.default_rng(0)
 
     def answer(self, query: DemoQuery, located: Located) -> Answer:
@@ -193,7 +197,7 @@ class _Judge:
 
     def track(self) -> list[tuple[float, float]]:
         """Where the survey's images were taken."""
-        easting, northing = np.array(sorted(set(self._positions))).T
+        easting, northing = np.unique(self._positions, axis=0).T
         lon, lat = self._to_wgs84.lon_lat(easting, northing)
         return list(zip(lon.tolist(), lat.tolist(), strict=True))
 

@@ -9,10 +9,10 @@ from pydantic import TypeAdapter
 
 from contracts.config import SearchConfig
 from contracts.errors import UnusableImage
+from contracts.progress import Progress
 from coordinator.export.evaluation import JudgedSheet, write_evaluation_page
 from coordinator.export.sheets import SheetMatch, thumbnail_jpeg
 from coordinator.export.tables import Table, markdown
-from coordinator.indexing import Progress
 from coordinator.truth import JudgedQuery
 from index.catalogue import Catalogue, CatalogueRow
 from index.opened import OpenedIndex
@@ -50,7 +50,7 @@ def report_of(answers: Sequence[Json], index: OpenedIndex, search: SearchConfig)
         "config": {
             "search": search.model_dump(mode="json"),
             "index": index.config.model_dump(mode="json"),
-            "n_images": index.n_images,
+            "n_images": index.n_live,
             "generation": index.generation.number,
         },
         "per_query": [asdict(result) for result in results],

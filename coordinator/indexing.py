@@ -1,34 +1,30 @@
-"""Indexing: extract, train, assign and merge, then one commit. Run again, it goes on."""
+"""Indexing: the stages of a job, then one commit. Run again, it goes on."""
 
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from pathlib import Path
-from typing import Protocol
 
-import numpy as np
-
-from contracts.errors import BadSurvey
+from contracts.errors import BadIndex
+from contracts.progress import Progress
 from contracts.records import Receipt, Skipped
+from coordinator.building import build, is_built
+from coordinator.committing import (
+    Segment,
+    all_skipped,
+    area_around,
+    extract_receipts,
+    finish_segment,
+    now,
+    positions_of,
+)
 from coordinator.engine import Engine
-from coordinator.follow import Follower, Order
-from coordinator.plan import Intake
-from geo.crs import area_of
-from index.catalogue import CatalogueRow, catalogue_row, write_catalogue
+from coordinator.intake import Intake
+from index.commits import Writer, is_worked_on, working, writing
+from index.files import check_files
 from index.jobs import JobFolder, JobPlan
-from index.manifest import FileEntry, Generation, SurveyEntry, commit, live_generation
-
-STAGES = ("extract", "train", "assign", "merge")
-
-
-class Progress(Protocol):
-    """What shows how far a stage is."""
-
-    def begin(self, stage: str, total: int, done: int) -> None: ...
-    def advance(self, stage: str) -> None: ...
+from index.manifest import Generation, read_generation
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +40,33 @@ class IndexReport:
     warnings: tuple[str, ...]
 
 
-def find_finished(root: Path, job: JobFolder) -> Generation | None:
-    """The live generation, if it is this job's."""
-    if not (root / "CURRENT").is_file():
+Assemble = Callable[[Writer, JobPlan, Intake, Segment], Generation]
+"""Makes of a ready segment, and of what is live, the generation that is to be committed."""
+
+
+def find_finished(job: JobFolder) -> Generation | None:
+    """The live generation, if what this job made is in it; None: there is work to do.
+
+    If files of it are missing and it holds what this job made and nothing else, the job can make
+    them again.
+
+    Raises
+    ------
+    BadIndex : what is live is damaged, and more than this job was needed to make it.
+    """
+    if not (job.root / "CURRENT").is_file():
         return None
-    generation = live_generation(root)
-    return generation if generation.job == job.job else None
+    live = read_generation(job.root)
+    done = {name for segment in live.segments for name in segment.jobs}
+    if job.job not in done:
+        return None
+    try:
+        check_files(job.root, live.sizes)
+    except BadIndex:
+        if done != {job.job} or live.n_live < live.n_images:
+            raise
+        return None
+    return live
 
 
 def run_job(
@@ -59,100 +76,85 @@ def run_job(
     engine: AbstractContextManager[Engine],
     progress: Progress,
 ) -> IndexReport:
-    """Do what is missing of a job and commit it; a finished job is only reported.
+    """Do what is missing of a job that indexes a survey, and make its segment the whole index.
 
+    A finished job is only reported; what was in the index before can be gone back to.
     engine : entered only if there is work.
     """
+    return run_and_commit(job, plan, intake, engine, progress, whole_index)
+
+
+def run_and_commit(
+    job: JobFolder,
+    plan: JobPlan,
+    intake: Intake,
+    engine: AbstractContextManager[Engine],
+    progress: Progress,
+    assemble: Assemble,
+) -> IndexReport:
+    """Do what is missing of a job and commit what `assemble` makes of it."""
     started = time.perf_counter()
-    generation = find_finished(job.root, job)
+    generation = find_finished(job)
     extracted = 0
     if generation is None:
-        with engine as running:
-            extracted = _run_stages(job, plan, running.follower, progress)
-        generation = _commit(job, plan, intake)
+        with working(job):
+            if not is_built(job, plan):
+                with engine as running:
+                    extracted = build(job, plan, running.follower, progress)
+            generation = _commit(job, plan, intake, assemble)
+    if not is_worked_on(job):  # by the same command, run twice at once
         job.drop_scratch()
-    receipts = _extract_receipts(job, plan)
+    return report_of_job(job, plan, intake, generation, extracted, started)
+
+
+def whole_index(writer: Writer, plan: JobPlan, intake: Intake, segment: Segment) -> Generation:
+    """A generation of this segment alone."""
+    return Generation(
+        number=writer.next_number(),
+        made_by=plan.verb,
+        created_at=now(),
+        config=plan.config,
+        config_digest=plan.config_digest,
+        crs=intake.crs,
+        area=area_around(positions_of(segment.rows), intake.crs),
+        allow_ballpark=intake.allow_ballpark,
+        codebooks=plan.codebooks,
+        codebooks_digest=segment.codebooks_digest,
+        segments=(segment.entry,),
+        files={**segment.files, **segment.codebook_files},
+    )
+
+
+def report_of_job(
+    job: JobFolder,
+    plan: JobPlan,
+    intake: Intake,
+    generation: Generation,
+    extracted: int,
+    started: float,
+) -> IndexReport:
+    """What a person is told of a finished job. started : by `time.perf_counter`."""
+    receipts = extract_receipts(job, plan)
     return IndexReport(
         generation=generation,
-        skipped=_all_skipped(intake, receipts),
+        skipped=all_skipped(intake, receipts),
         without_frames=sum(receipt.counts["without_frames"] for receipt in receipts),
         images_extracted=extracted,
-        bytes_on_disk=sum(entry.size for entry in generation.files.values()),
+        bytes_on_disk=generation.n_bytes,
         seconds=time.perf_counter() - started,
         warnings=_warnings(receipts),
     )
 
 
-def _run_stages(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress) -> int:
-    channels = plan.config.features.channels()
-    shards = range(plan.n_shards)
-    where = {"index": str(job.root), "job": job.job}
-
-    untrained = [name for name in channels if not job.valid_receipt("train", name)]
-    unassigned = [n for n in shards if untrained or not job.valid_receipt("assign", f"{n:06d}")]
-    # The features of an assigned shard are gone; they are needed again only to train.
-    needed = list(shards) if untrained else unassigned
-    missing = [n for n in needed if not job.valid_receipt("extract", f"{n:06d}")]
-
-    def run(stage: str, total: int, orders: list[Order]) -> Iterator[Order]:
-        progress.begin(stage, total, total - len(orders))
-        for order, _ in follower.results(orders):
-            progress.advance(stage)
-            yield order
-
-    extracts = [Order("extract", f"{n:06d}", {**where, "shard": n}) for n in missing]
-    _drain(run("extract", len(shards), extracts))
-    trains = [Order("train", name, {**where, "channel": name}) for name in untrained]
-    n_images = sum(_n_indexed(job, shard) for shard in shards)
-    if n_images == 0:
-        raise BadSurvey(
-            f"Not one of the {plan.n_images} images can be read; see {job.path / 'receipts'}. "
-            "Check the survey's files."
-        )
-    _drain(run("train", len(channels), trains))
-
-    first_ids = _first_ids(job, plan)
-    assigns = [
-        Order("assign", f"{n:06d}", {**where, "shard": n, "first_image_id": first_ids[n]})
-        for n in unassigned
-    ]
-    for order in run("assign", len(shards), assigns):
-        job.features(int(order.key)).unlink(missing_ok=True)
-    merges = [
-        Order("merge", name, {**where, "channel": name, "n_images": n_images})
-        for name in channels
-        if unassigned or not job.valid_receipt("merge", name)
-    ]
-    _drain(run("merge", len(channels), merges))
-    return sum(_n_indexed(job, shard) for shard in missing)
-
-
-def _drain(orders: Iterable[Order]) -> None:
-    for _ in orders:
-        pass
-
-
-def _n_indexed(job: JobFolder, shard: int) -> int:
-    return len(job.read_indexed(shard))
-
-
-def _first_ids(job: JobFolder, plan: JobPlan) -> list[int]:
-    """Ids are dense over the readable images: each shard begins where the former one ended."""
-    first, ids = 0, []
-    for shard in range(plan.n_shards):
-        ids.append(first)
-        first += _n_indexed(job, shard)
-    return ids
-
-
-def _extract_receipts(job: JobFolder, plan: JobPlan) -> list[Receipt]:
-    receipts = (job.read_receipt("extract", f"{shard:06d}") for shard in range(plan.n_shards))
-    return [receipt for receipt in receipts if receipt is not None]
-
-
-def _all_skipped(intake: Intake, receipts: Iterable[Receipt]) -> tuple[Skipped, ...]:
-    unreadable = [skipped for receipt in receipts for skipped in receipt.skipped]
-    return tuple(sorted((*intake.skipped, *unreadable), key=lambda skipped: skipped.uri.encode()))
+def _commit(job: JobFolder, plan: JobPlan, intake: Intake, assemble: Assemble) -> Generation:
+    segment = finish_segment(job, plan, intake)
+    with writing(job.root) as writer:
+        done = find_finished(job)
+        if done is not None:
+            return done
+        generation = assemble(writer, plan, intake, segment)
+        writer.commit(generation)
+    return generation
 
 
 def _warnings(receipts: Iterable[Receipt]) -> tuple[str, ...]:
@@ -164,85 +166,3 @@ def _warnings(receipts: Iterable[Receipt]) -> tuple[str, ...]:
         "the index is sound, but another run may differ in bytes."
     )
     return (warning,)
-
-
-def _commit(job: JobFolder, plan: JobPlan, intake: Intake) -> Generation:
-    rows: list[CatalogueRow] = []
-    for shard in range(plan.n_shards):
-        for indexed in job.read_indexed(shard):
-            position = shard * plan.shard_size + indexed.row
-            rows.append(
-                catalogue_row(
-                    len(rows),
-                    intake.survey_names[position],
-                    intake.images[position],
-                    indexed.sha256,
-                    indexed.width_px,
-                    indexed.height_px,
-                )
-            )
-    catalogue = job.root / "catalogue" / f"{plan.segment}.parquet"
-    outputs = {job.relative(catalogue): write_catalogue(catalogue, rows, intake.crs)}
-    n_postings = 0
-    for channel in plan.config.features.channels():
-        for stage in ("train", "merge"):
-            receipt = job.valid_receipt(stage, channel)
-            if receipt is None:
-                raise BadSurvey(
-                    f"The files of {stage} {channel} changed while the job ran. Run it again."
-                )
-            outputs.update(receipt.outputs)
-            n_postings += receipt.counts.get("postings", 0)
-    skipped = _all_skipped(intake, _extract_receipts(job, plan))
-    job.write_skipped([{"uri": each.uri, "reason": each.reason} for each in skipped])
-    generation = Generation(
-        number=_next_number(job.root),
-        job=job.job,
-        created_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        config=plan.config,
-        config_digest=plan.config_digest,
-        crs=intake.crs,
-        area=_area(rows, intake.crs),
-        allow_ballpark=intake.allow_ballpark,
-        n_images=len(rows),
-        n_skipped=len(skipped),
-        n_postings=n_postings,
-        surveys=tuple(
-            SurveyEntry(
-                name=named.name,
-                path=str(named.path),
-                format=named.survey.format,
-                n_images=len(named.survey.images),
-                attribution=named.survey.attribution,
-            )
-            for named in intake.surveys
-        ),
-        segment=plan.segment,
-        files={
-            name: FileEntry(sha256=digest, size=(job.root / name).stat().st_size)
-            for name, digest in sorted(outputs.items())
-        },
-    )
-    commit(job.root, generation)
-    return generation
-
-
-def _area(
-    rows: Sequence[CatalogueRow], crs: str | None
-) -> tuple[float, float, float, float] | None:
-    posed = [
-        (row.easting, row.northing)
-        for row in rows
-        if row.easting is not None and row.northing is not None
-    ]
-    if crs is None or not posed:
-        return None
-    area = area_of(crs, *np.array(posed).T)
-    if area is None:
-        return None
-    return area.west_lon_degree, area.south_lat_degree, area.east_lon_degree, area.north_lat_degree
-
-
-def _next_number(root: Path) -> int:
-    taken = [int(path.stem) for path in (root / "generations").glob("[0-9]*.json")]
-    return max(taken, default=0) + 1

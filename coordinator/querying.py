@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from contracts.config import SearchConfig, Vote, Weight
+from contracts.config import SearchConfig, Vote, Weight, Where
 from contracts.errors import TaskFailed
 from coordinator.follow import Follower, Order, Outcome
 from coordinator.truth import JudgedQuery
 from geo.geojson import Feature, Kind, error_feature
 from index.opened import OpenedIndex
+from index.selecting import n_selected
 
 Json = dict[str, Any]
 
@@ -76,6 +77,17 @@ class Located:
         """How the search was settled where no model chose it: a person should know."""
         choices = {str(each["properties"]["choice"]) for each in self.of_kind("match")}
         return {choice for choice in choices if choice.startswith(("default", "fallback"))}
+
+
+def searched(index: OpenedIndex, where: Where) -> Json:
+    """Which images a search is about, for its results to tell; nothing is sent for none.
+
+    Raises
+    ------
+    BadConfig : no image is meant.
+    """
+    conditions = where.model_dump(mode="json", exclude_defaults=True)
+    return {"images": n_selected(index, where), **conditions}
 
 
 def locate_photos(

@@ -5,17 +5,26 @@ image_id is the row number: dense, in the order of the NFC bytes of the uri.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
+import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from contracts.config import North
+from contracts.dates import utc_instant
 from contracts.errors import BadIndex
 from contracts.records import PosedImage
 from geo.crs import parse_crs
+from index.catalogue_file import MEND, CatalogueFile
 from index.files import write_bytes
+
+GROUP_ROWS = 4096
+"""Rows that are read together where one of them is asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +69,9 @@ _TYPES = {
     "height_px": pa.int32(),
     "quarter_turns": pa.int8(),
 }
-_COLUMNS = tuple(CatalogueRow.__dataclass_fields__)
+SCHEMA = pa.schema(
+    [(name, _TYPES.get(name, pa.string())) for name in CatalogueRow.__dataclass_fields__]
+)
 
 
 def catalogue_row(
@@ -99,12 +110,11 @@ def write_catalogue(path: Path, rows: Sequence[CatalogueRow], crs: str | None) -
     crs : of the poses; the geometry (null where there is no pose) has its horizontal part.
     """
     import geopandas as gpd  # slow to import, and only the writer needs it
-    import numpy as np
     import shapely
 
     table = {
-        name: pa.array([getattr(row, name) for row in rows], type=_TYPES.get(name, pa.string()))
-        for name in _COLUMNS
+        field.name: pa.array([getattr(row, field.name) for row in rows], type=field.type)
+        for field in SCHEMA
     }
     xy = np.array([(row.easting, row.northing) for row in rows], dtype=np.float64).reshape(-1, 2)
     posed = np.isfinite(xy).all(axis=1)
@@ -113,39 +123,96 @@ def write_catalogue(path: Path, rows: Sequence[CatalogueRow], crs: str | None) -
     horizontal = None if crs is None else parse_crs(crs)
     frame = gpd.GeoDataFrame(pa.table(table).to_pandas(), geometry=geometry, crs=horizontal)
     buffer = BytesIO()
-    frame.to_parquet(buffer, index=False, schema_version="1.1.0")
+    frame.to_parquet(
+        buffer,
+        index=False,
+        schema_version="1.1.0",
+        row_group_size=GROUP_ROWS,
+        write_page_checksum=True,
+    )
     return write_bytes(path, buffer.getvalue())
 
 
 class Catalogue:
-    """Rows of a written catalogue, read as they are asked for."""
+    """Rows of the written catalogues of an index's segments, read as they are asked for.
 
-    def __init__(self, path: Path) -> None:
-        try:
-            self._table = pq.read_table(path, columns=list(_COLUMNS))
-        except (OSError, pa.ArrowException) as error:
-            raise BadIndex(
-                f"{path} cannot be read as a catalogue ({error}). Restore it or index again."
-            ) from error
+    A row's image_id is that of the whole index: its segment's rows follow those before. Methods
+    raise BadIndex for a damaged file.
+    """
+
+    def __init__(self, paths: Sequence[Path], n_rows: Sequence[int]) -> None:
+        self._files = [
+            CatalogueFile(path, count, SCHEMA) for path, count in zip(paths, n_rows, strict=True)
+        ]
+        self._begins = np.cumsum([0, *n_rows], dtype=np.int64)
 
     def __len__(self) -> int:
-        return int(self._table.num_rows)
+        return int(self._begins[-1])
 
-    def rows(self, image_ids: Sequence[int]) -> list[CatalogueRow]:
-        """The rows of some images, in the order asked for."""
-        taken = self._table.take(pa.array(image_ids, type=pa.int64())).to_pylist()
-        return [CatalogueRow(**row) for row in taken]
+    def rows(self, image_ids: Sequence[int] | NDArray[np.int64]) -> list[CatalogueRow]:
+        """The rows of some images, in the order asked for.
+
+        Raises
+        ------
+        BadIndex : there is no such image.
+        """
+        ids = np.asarray(image_ids, dtype=np.int64)
+        wrong = ids[(ids < 0) | (ids >= len(self))]
+        if len(wrong):
+            raise BadIndex(f"image {wrong[0]} was asked for; the catalogue has {len(self)} images")
+        rows: list[dict[str, Any]] = [{}] * len(ids)
+        segments = np.searchsorted(self._begins, ids, side="right") - 1
+        for segment in np.unique(segments).tolist():
+            mine = np.flatnonzero(segments == segment)
+            found = self._files[segment].rows(ids[mine] - self._begins[segment])
+            for at, row in zip(mine.tolist(), found, strict=True):
+                rows[at] = row
+        return [
+            CatalogueRow(**{**row, "image_id": image_id})
+            for row, image_id in zip(rows, ids.tolist(), strict=True)
+        ]
 
     def column(self, name: str) -> list[str]:
-        """One text column (`uri`, `sha256`, …) of all images."""
-        values: list[str] = self._table.column(name).to_pylist()
+        """A text column that every image has (`uri`, `sha256`, …), of all images."""
+        column = self._column(name)
+        if column.null_count:
+            raise BadIndex(
+                f"{column.null_count} of the {len(self)} images of the catalogue have no {name}; "
+                f"`flaneur verify` names the file. {MEND}"
+            )
+        values: list[str] = column.to_pylist()
         return values
 
-    def positions(self) -> list[tuple[float, float]]:
-        """(easting, northing) of every posed image, in the order of ids."""
-        pairs = zip(
-            self._table.column("easting").to_pylist(),
-            self._table.column("northing").to_pylist(),
-            strict=True,
-        )
-        return [(x, y) for x, y in pairs if x is not None and y is not None]
+    def texts(self, name: str, image_ids: NDArray[np.int64]) -> list[str | None]:
+        """A text column that not every image has (`north`, `captured_at`), of some images."""
+        values: list[str | None] = self._column(name).take(pa.array(image_ids)).to_pylist()
+        return values
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """One column of numbers of all images, (n_images,) float64; NaN: not known."""
+        return np.asarray(self._column(name).cast(pa.float64()), np.float64)
+
+    def moments(self) -> NDArray[np.datetime64]:
+        """When each image was taken, (n_images,) datetime64[us] in UTC; NaT: not known."""
+        column = self._column("captured_at")
+        try:
+            return np.asarray(column.cast(pa.timestamp("us", "UTC")))
+        except pa.ArrowInvalid:  # zones of a century ago had odd seconds: one by one
+            return np.array([_instant(text) for text in column.to_pylist()], "datetime64[us]")
+
+    def is_among(self, name: str, values: Sequence[str]) -> NDArray[np.bool_]:
+        """Whose text column has one of these values; (n_images,) bool."""
+        column = self._column(name)
+        return np.array(pc.is_in(column, pa.array(values, column.type)), dtype=np.bool_)
+
+    def _column(self, name: str) -> pa.ChunkedArray:
+        empty = pa.chunked_array([], SCHEMA.field(name).type)
+        chunks = [chunk for file in self._files for chunk in file.column(name).chunks]
+        return pa.chunked_array(chunks, empty.type)
+
+
+def _instant(text: str | None) -> np.datetime64:
+    try:
+        return np.datetime64("NaT") if text is None else utc_instant(datetime.fromisoformat(text))
+    except (ValueError, OverflowError):
+        return np.datetime64("NaT")

@@ -7,18 +7,29 @@ the files it names still have the digests it names.
 import json
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from contracts.config import IndexConfig
 from contracts.errors import BadIndex, TaskFailed
+from contracts.faults import first_fault
 from contracts.records import PosedImage, Receipt
-from index.files import sha256_of, write_bytes
+from index.files import is_inside, read_text_file, sha256_of, write_bytes
+from index.manifest import Name
+
+SCRATCH = ("features", "partials", "pieces", "ids")
+"""Folders of a job that nobody needs once it is committed."""
 
 _JOB_ID = re.compile(r"[0-9a-f]{16}")
+_MAX_LIST_BYTES = 2**28
+"""Of a plan or a shard's list: some half a million images."""
+
+Parsed = TypeVar("Parsed")
+Verb = Literal["index", "add", "compact"]
 _RECEIPT = TypeAdapter(Receipt)
 _IMAGES = TypeAdapter(list[PosedImage])
 
@@ -28,9 +39,16 @@ class JobPlan(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     job: str
+    verb: Verb
     config: IndexConfig
     config_digest: str
-    segment: str
+    segment: Name
+    codebooks: Name
+    """Where its words are."""
+    trains: bool
+    """Whether the job makes these words; otherwise they are there before it begins."""
+    compacts: tuple[Name, ...] = ()
+    """Segments whose live images become one segment; then there are no shards."""
     n_images: int
     shard_size: int
     n_shards: int
@@ -75,10 +93,17 @@ class JobFolder:
     def features(self, shard: int) -> Path:
         return self.path / "features" / f"{shard:06d}.npz"
 
-    def partial(self, shard: int, channel: str) -> tuple[Path, Path]:
-        """The shard's inverted index of a channel: (indptr, image ids)."""
-        folder = self.path / "partials" / f"{shard:06d}"
-        return folder / f"{channel}.indptr.npy", folder / f"{channel}.ids.npy"
+    def partial(self, shard: int, channel: str) -> Path:
+        """The shard's inverted index of a channel, as ascending keys."""
+        return self.path / "partials" / channel / f"{shard:06d}.npy"
+
+    def piece(self, channel: str, first_word: int) -> Path:
+        """A range of words of a channel, merged and packed."""
+        return self.path / "pieces" / channel / f"{first_word:07d}.npz"
+
+    def new_ids(self, segment: str) -> Path:
+        """The ids that a segment's images get when it is compacted; int64, -1 = left out."""
+        return self.path / "ids" / f"{segment}.npy"
 
     def receipt_path(self, stage: str, key: str) -> Path:
         return self.path / "receipts" / stage / f"{key}.json"
@@ -90,19 +115,41 @@ class JobFolder:
         write_bytes(self.path / "plan.json", plan.model_dump_json(indent=1).encode())
 
     def read_plan(self) -> JobPlan:
-        return JobPlan.model_validate_json(_read(self.path / "plan.json"))
+        """The plan.
+
+        Raises
+        ------
+        BadIndex : it cannot be read, is damaged, or is another job's.
+        """
+        path = self.path / "plan.json"
+        plan = _checked(path, JobPlan.model_validate_json)
+        if plan.job != self.job:
+            raise BadIndex(f"{path} is the plan of job {plan.job[:40]!r}. {_again(path)}")
+        return plan
 
     def has_plan(self) -> bool:
         return (self.path / "plan.json").is_file()
 
     def read_images(self, shard: int) -> list[PosedImage]:
-        return _IMAGES.validate_json(_read(self.images_of_shard(shard)))
+        """The shard's images as planned.
+
+        Raises
+        ------
+        BadIndex : the list cannot be read or is damaged.
+        """
+        return _checked(self.images_of_shard(shard), _IMAGES.validate_json)
 
     def write_indexed(self, shard: int, images: Sequence[IndexedImage]) -> str:
         return write_bytes(self.indexed_of_shard(shard), _INDEXED.dump_json(list(images)))
 
     def read_indexed(self, shard: int) -> list[IndexedImage]:
-        return _INDEXED.validate_json(_read(self.indexed_of_shard(shard)))
+        """Those of them that could be read.
+
+        Raises
+        ------
+        BadIndex : the list cannot be read or is damaged.
+        """
+        return _checked(self.indexed_of_shard(shard), _INDEXED.validate_json)
 
     def relative(self, path: Path) -> str:
         """A path as receipts name it: relative to the index."""
@@ -116,7 +163,7 @@ class JobFolder:
     def read_receipt(self, stage: str, key: str) -> Receipt | None:
         """The receipt, or None where there is none or it cannot be read."""
         try:
-            return _RECEIPT.validate_json(self.receipt_path(stage, key).read_bytes())
+            return _RECEIPT.validate_json(read_text_file(self.receipt_path(stage, key)))
         except (OSError, ValidationError):
             return None
 
@@ -127,7 +174,7 @@ class JobFolder:
             return None
         for name, digest in receipt.outputs.items():
             path = self.root / name
-            if not path.is_file() or sha256_of(path) != digest:
+            if not (is_inside(name) and path.is_file()) or sha256_of(path) != digest:
                 return None
         return receipt
 
@@ -138,15 +185,30 @@ class JobFolder:
 
     def drop_scratch(self) -> None:
         """Remove what only the job itself needed."""
-        for name in ("features", "partials"):
+        for name in SCRATCH:
             shutil.rmtree(self.path / name, ignore_errors=True)
 
 
-def _read(path: Path) -> bytes:
+def jobs_of(root: Path) -> list[JobFolder]:
+    """The jobs begun in an index; what else lies in its `jobs/` is not ours."""
+    names = sorted(path.name for path in (root / "jobs").glob("*") if path.is_dir())
+    return [JobFolder(root, name) for name in names if _JOB_ID.fullmatch(name)]
+
+
+def _checked(path: Path, parse: Callable[[bytes], Parsed]) -> Parsed:
     try:
-        return path.read_bytes()
+        return parse(read_text_file(path, _MAX_LIST_BYTES))
     except OSError as error:
         raise BadIndex(
             f"{path} cannot be read ({error.strerror}). Workers must see the index under the same "
-            "path as the coordinator; otherwise remove the job's folder and index again."
+            f"path as the coordinator; otherwise: {_again(path)}"
         ) from error
+    except ValidationError as error:
+        where, what = first_fault(error)
+        told = f"{where}: {what}" if where else what
+        raise BadIndex(f"{path} is damaged ({told}). {_again(path)}") from error
+
+
+def _again(path: Path) -> str:
+    folder = path.parent if path.name == "plan.json" else path.parents[1]
+    return f"Remove the folder {folder} and run the same command again."

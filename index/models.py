@@ -6,7 +6,7 @@ from pathlib import Path
 
 from contracts.errors import BadIndex
 from geo.confidence import PlacingModel
-from index.files import write_bytes
+from index.files import read_text_file, write_bytes
 from retrieval.choice import ChoiceModel
 
 _SHIPPED = "default_choice.json"
@@ -28,8 +28,9 @@ def read_model(root: Path | None) -> ChoiceModel | None:
     if root is not None:
         path = model_path(root)
         try:
-            if path.is_file():
-                return ChoiceModel.from_json(path.read_text(encoding="utf-8"))
+            return ChoiceModel.from_json(read_text_file(path).decode())
+        except FileNotFoundError:
+            pass  # the shipped one
         except (OSError, UnicodeDecodeError) as error:
             raise BadIndex(
                 f"{path} cannot be read ({error}). Run `flaneur train` again."

@@ -1,93 +1,136 @@
-"""Segments on disk: one inverted index a channel.
+"""Segments on disk: one packed inverted index a channel, and the pieces it is joined from.
 
-`segments/<segment>/<channel>/` holds indptr.npy (V + 1,) int64, image_ids.npy (P,) uint32
-ascending within a word, and words_per_image.npy (n_images,) uint32.
+`segments/<segment>/<channel>/` holds offsets.npy (V + 1,) int64, where each word's bytes begin;
+counts.npy (V,) uint32, its images; packed.npy (B,) uint8; words_per_image.npy (n_images,) uint32.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadIndex
-from contracts.records import Postings
-from index.files import map_array, write_array, write_atomic
-from retrieval.postings import distinct_words, merge_postings
+from contracts.records import PackedPostings, Postings
+from index.files import map_array, read_member, write_array, write_arrays, write_atomic
+from retrieval.packing import pack
+from retrieval.postings import distinct_words
 
-NAMES = ("indptr.npy", "image_ids.npy", "words_per_image.npy")
+_AGAIN = "Remove the job's folder and run the same command again."
 
 
-def segment_paths(root: Path, segment: str, channel: str) -> tuple[Path, Path, Path]:
-    """(indptr, image ids, distinct words of each image)."""
+@dataclass(frozen=True, slots=True)
+class SegmentPaths:
+    """The files of one channel of a segment."""
+
+    offsets: Path
+    counts: Path
+    packed: Path
+    words_per_image: Path
+
+
+def segment_paths(root: Path, segment: str, channel: str) -> SegmentPaths:
+    """Where a channel of a segment is."""
     folder = root / "segments" / segment / channel
-    return folder / NAMES[0], folder / NAMES[1], folder / NAMES[2]
+    return SegmentPaths(
+        folder / "offsets.npy",
+        folder / "counts.npy",
+        folder / "packed.npy",
+        folder / "words_per_image.npy",
+    )
 
 
-def write_segment(
-    paths: tuple[Path, Path, Path],
-    parts: Sequence[tuple[Path, Path]],
-    n_words: int,
-    n_images: int,
-    words_at_once: int,
-) -> tuple[dict[Path, str], int]:
-    """Merge partial indices (indptr, ids) of all words, a range of words at a time.
+def map_segment(paths: SegmentPaths, n_words: int, n_images: int) -> PackedPostings:
+    """Map a channel read-only; headers and sizes are checked here, bytes when they are unpacked.
 
-    Memory is bounded by the postings of `words_at_once` words, not by the index.
-    Returns path -> sha256 and the number of postings.
+    Raises
+    ------
+    BadIndex : a file is missing or damaged, or they do not fit each other.
     """
-    mapped = [map_postings(indptr, ids, n_words) for indptr, ids in parts]
-    lengths = np.zeros(n_words, dtype=np.int64)
-    words_per_image = np.zeros(n_images, dtype=np.int64)
-    ranges = [
-        (start, min(start + words_at_once, n_words)) for start in range(0, n_words, words_at_once)
-    ]
-
-    def merged_ranges(sink: Callable[[NDArray[np.uint32]], object]) -> None:
-        for start, stop in ranges:
-            merged = merge_postings([_words(part, start, stop) for part in mapped])
-            lengths[start:stop] = np.diff(merged.indptr)
-            words_per_image[:] += distinct_words(merged, n_images)
-            sink(merged.image_ids)
-
-    # The length of the .npy header is not known before the ranges are merged, so the ids go into
-    # a headerless file first and are given their header as they are copied to their name.
-    scratch = paths[1].with_suffix(".part")
-    scratch.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with scratch.open("wb") as stream:
-            merged_ranges(lambda ids: stream.write(ids.tobytes()))
-        n_postings = int(lengths.sum())
-        ids: NDArray[np.uint32] = np.zeros(0, dtype=np.uint32)
-        if n_postings:
-            ids = np.memmap(scratch, dtype=np.uint32, mode="r", shape=(n_postings,))
-        indptr = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(lengths)])
-        written = {
-            paths[0]: write_array(paths[0], indptr),
-            paths[1]: write_atomic(paths[1], lambda out: np.save(out, ids, allow_pickle=False)),
-            paths[2]: write_array(paths[2], words_per_image.astype(np.uint32)),
-        }
-    finally:
-        scratch.unlink(missing_ok=True)
-    return written, n_postings
-
-
-def map_postings(indptr_path: Path, ids_path: Path, n_words: int | None = None) -> Postings:
-    """Map postings read-only and check that sizes agree; ids are checked by the kernels."""
-    indptr = map_array(indptr_path, np.int64, 1).astype(np.int64, copy=False)
-    ids = map_array(ids_path, np.uint32, 1).astype(np.uint32, copy=False)
-    if len(indptr) == 0 or indptr[0] != 0 or indptr[-1] != len(ids):
+    offsets = map_array(paths.offsets, np.int64, 1)
+    counts = map_array(paths.counts, np.uint32, 1)
+    packed = map_array(paths.packed, np.uint8, 1)
+    expected = {
+        paths.offsets: (len(offsets), n_words + 1),
+        paths.counts: (len(counts), n_words),
+        paths.words_per_image: (len(map_array(paths.words_per_image, np.uint32, 1)), n_images),
+    }
+    for path, (found, wanted) in expected.items():
+        if found != wanted:
+            raise BadIndex(
+                f"{path} has {found} entries, expected {wanted} for {n_words} words and "
+                f"{n_images} images. Restore it or index again."
+            )
+    if offsets[0] != 0 or offsets[-1] != len(packed):
         raise BadIndex(
-            f"{indptr_path} and {ids_path.name} do not fit each other. Restore them or index again."
+            f"{paths.offsets} runs from {offsets[0]} to {offsets[-1]}, expected 0 to the "
+            f"{len(packed)} bytes of {paths.packed.name}. Restore them or index again."
         )
-    if n_words is not None and len(indptr) != n_words + 1:
+    return PackedPostings(offsets, counts, packed)
+
+
+def write_piece(path: Path, postings: Postings, n_images: int) -> str:
+    """Pack a range of words into a file that waits to be joined; returns its sha256.
+
+    Raises
+    ------
+    BadIndex : an image beyond `n_images`.
+    """
+    words_per_image = distinct_words(postings, n_images).astype(np.uint32)
+    packed = pack(postings)
+    return write_arrays(
+        path,
+        {
+            "counts": packed.counts,
+            "sizes": np.diff(packed.offsets),
+            "words_per_image": words_per_image,
+            "packed": packed.packed,
+        },
+    )
+
+
+def join_pieces(
+    paths: SegmentPaths, pieces: Sequence[Path], n_words: int, n_images: int
+) -> tuple[dict[Path, str], int]:
+    """Lay the pieces of all words, in the order of their words, end to end.
+
+    Memory is that of a piece, some 30 bytes a word and 8 an image. Returns path -> sha256 and the
+    number of postings; the same bytes however the words were cut into pieces.
+
+    Raises
+    ------
+    BadIndex : a piece is missing, damaged or of another number of images, or words are missing.
+    """
+    counts: list[NDArray[np.uint32]] = [np.zeros(0, dtype=np.uint32)]
+    sizes: list[NDArray[np.int64]] = [np.zeros(1, dtype=np.int64)]
+    words_per_image = np.zeros(n_images, dtype=np.uint32)
+    for piece in pieces:
+        counts.append(read_member(piece, "counts", np.uint32, 1))
+        sizes.append(read_member(piece, "sizes", np.int64, 1))
+        found = read_member(piece, "words_per_image", np.uint32, 1)
+        if len(found) != n_images:
+            raise BadIndex(f"{piece} is of {len(found)} images, not {n_images}. {_AGAIN}")
+        words_per_image += found
+    offsets = np.cumsum(np.concatenate(sizes))
+    of_words = np.concatenate(counts)
+    if not len(of_words) == len(offsets) - 1 == n_words:
         raise BadIndex(
-            f"{indptr_path} is for {len(indptr) - 1} words; the codebook has {n_words}. "
-            "Remove the job's folder and index again."
+            f"{len(pieces)} pieces for {paths.packed.parent} hold {len(of_words)} words, the "
+            f"codebook {n_words}. {_AGAIN}"
         )
-    return Postings(indptr, ids)
 
+    def copy(stream: IO[bytes]) -> None:
+        header = {"descr": "|u1", "fortran_order": False, "shape": (int(offsets[-1]),)}
+        np.lib.format.write_array_header_1_0(stream, header)
+        for piece in pieces:
+            stream.write(read_member(piece, "packed", np.uint8, 1).data)
 
-def _words(part: Postings, start: int, stop: int) -> Postings:
-    first, last = int(part.indptr[start]), int(part.indptr[stop])
-    return Postings(part.indptr[start : stop + 1] - first, part.image_ids[first:last])
+    written = {
+        paths.offsets: write_array(paths.offsets, offsets),
+        paths.counts: write_array(paths.counts, of_words),
+        paths.packed: write_atomic(paths.packed, copy),
+        paths.words_per_image: write_array(paths.words_per_image, words_per_image),
+    }
+    return written, int(of_words.sum(dtype=np.int64))

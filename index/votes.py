@@ -1,16 +1,15 @@
 """What rehearsing one query leaves on disk for comparing: votes, and outcomes of all ways."""
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
-from numpy.lib.npyio import NpzFile
 from pydantic import TypeAdapter, ValidationError
 
 from contracts.config import Detector
 from contracts.errors import BadIndex
-from index.files import write_arrays, write_bytes
+from index.files import read_member, read_text_file, write_arrays, write_bytes
 from retrieval.fusion import Scores
 from retrieval.ways import Outcome, Votes
 
@@ -33,19 +32,16 @@ def read_votes(path: Path, detectors: tuple[Detector, ...], ks: tuple[int, ...])
     ------
     BadIndex : the file is missing, damaged, or lacks a detector or k.
     """
-    try:
-        with path.open("rb") as stream, NpzFile(stream, allow_pickle=False) as content:
-            arrays = {
-                (name, k): content[f"{name}-{k}"].astype(np.float64)
-                for name in detectors
-                for k in ks
-            }
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise BadIndex(f"{path} does not hold the votes of a query ({error}).") from error
-    return {
-        key: Scores(np.nan_to_num(values, nan=0.0), ~np.isnan(values))
-        for key, values in arrays.items()
-    }
+    votes = {}
+    for detector, k in product(detectors, ks):
+        try:
+            values = read_member(path, f"{detector}-{k}", np.float32, 1).astype(np.float64)
+        except BadIndex as error:
+            raise BadIndex(
+                f"{path} does not hold the votes of a query ({detector}-{k}). Evaluate again."
+            ) from error
+        votes[detector, k] = Scores(np.nan_to_num(values, nan=0.0), ~np.isnan(values))
+    return votes
 
 
 def write_outcomes(votes_path: Path, outcomes: Sequence[Outcome]) -> None:
@@ -62,6 +58,8 @@ def read_outcomes(votes_path: Path) -> list[Outcome]:
     """
     path = votes_path.with_suffix(".json")
     try:
-        return _OUTCOMES.validate_json(path.read_bytes())
+        return _OUTCOMES.validate_json(read_text_file(path))
     except (OSError, ValidationError) as error:
-        raise BadIndex(f"{path} does not hold the outcomes of a query ({error}).") from error
+        raise BadIndex(
+            f"{path} does not hold the outcomes of a query ({error}). Evaluate again."
+        ) from error

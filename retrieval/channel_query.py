@@ -14,9 +14,10 @@ from contracts.records import Postings
 class ChannelQuery:
     """The nearest words of a photo's keypoints in one channel, and that channel's postings.
 
-    word_ids : (n, k) int32, nearest first. sq_dist : (n, k) float32, squared L2, ascending.
+    word_ids : (n, k) int32, words of `postings`, nearest first.
+    sq_dist : (n, k) float32, squared L2, ascending.
     dmin, dmax : the codebook's smallest 1-NN and largest k-NN distance, squared.
-    idf : (V,) float64, ln(N / df) without removed images; None if unused.
+    idf : (V,) float64, ln(N / df) of each of these postings' words; None if unused.
     """
 
     word_ids: NDArray[np.int32]

@@ -10,7 +10,7 @@ import faiss
 import numpy as np
 from numpy.typing import NDArray
 
-from retrieval.word_search import WordTable, exhaustive_index, list_index
+from retrieval.word_search import lists_around, nearest_words, one_list
 
 _ITERATIONS = 15
 _FLAT_WORK = 100_000_000
@@ -19,7 +19,7 @@ _FLAT_WORK = 100_000_000
 _POINTS_PER_COARSE_CLUSTER = 256
 _REFINEMENTS = 3
 _REFINEMENT_PROBES = 8
-_SUM_BLOCK = 65_536
+_CENTRES_MOVED_AT_ONCE = 8_192
 
 
 @contextmanager
@@ -66,8 +66,7 @@ def two_level_kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> N
     """
     n_coarse = round(np.sqrt(n_clusters))
     coarse = flat_kmeans(points[: n_coarse * _POINTS_PER_COARSE_CLUSTER], n_coarse, seed)
-    with one_thread():
-        nearest = WordTable(exhaustive_index(coarse)).nearest(points, 1)[0][:, 0]
+    nearest = nearest_words(points, coarse, one_list(coarse), 1)[0][:, 0]
     sizes = np.bincount(nearest, minlength=n_coarse)
     members = np.split(np.argsort(nearest, kind="stable"), np.cumsum(sizes)[:-1])
     centres = np.concatenate(
@@ -88,20 +87,18 @@ def _lloyd_step(
     points: NDArray[np.uint8], centres: NDArray[np.uint8], coarse: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """Move each centre to the rounded mean of the points that find it; one without stays."""
-    with one_thread():
-        table = WordTable(list_index(centres, coarse), _REFINEMENT_PROBES)
-        nearest = table.nearest(points, 1)[0][:, 0]
-    sums = np.zeros(centres.shape, dtype=np.int64)
-    for start in range(0, len(points), _SUM_BLOCK):
-        block = nearest[start : start + _SUM_BLOCK]
-        order = np.argsort(block, kind="stable")
-        found, first = np.unique(block[order], return_index=True)
-        members = points[start : start + _SUM_BLOCK][order]
-        sums[found] += np.add.reduceat(members, first, axis=0, dtype=np.int64)
+    lists = lists_around(coarse, centres)
+    nearest = nearest_words(points, centres, lists, 1, _REFINEMENT_PROBES)[0][:, 0]
+    order = np.argsort(nearest, kind="stable")
     sizes = np.bincount(nearest, minlength=len(centres))
+    starts = np.concatenate([[0], np.cumsum(sizes)])
     moved = centres.copy()
-    used = sizes > 0
-    moved[used] = np.rint(sums[used] / sizes[used, None])
+    for first in range(0, len(centres), _CENTRES_MOVED_AT_ONCE):
+        used = first + np.flatnonzero(sizes[first : first + _CENTRES_MOVED_AT_ONCE])
+        if len(used):
+            members = points[order[starts[used[0]] : starts[used[-1] + 1]]]
+            sums = np.add.reduceat(members, starts[used] - starts[used[0]], axis=0, dtype=np.int64)
+            moved[used] = np.rint(sums / sizes[used, None])
     return moved
 
 

@@ -4,24 +4,35 @@ Descriptors and words are uint8, so that every squared distance is a whole numbe
 exact in float32: see docs/decisions/0002-integer-descriptors-and-words.md.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-import faiss
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.config import MAX_NEIGHBOURS, CodebookConfig, DistanceScale
 from contracts.errors import VocabularyMismatch, WrongInput
-from retrieval.clustering import flat_kmeans, kmeans, one_thread
-from retrieval.word_search import WordTable, exhaustive_index, list_index
+from retrieval.clustering import flat_kmeans, kmeans
+from retrieval.word_search import WordLists, lists_around, nearest_words, one_list
 
 _EXHAUSTIVE_WORDS = 4_096
 """Up to here a descriptor is compared with every word; above, with those of the nearest lists."""
 
 _LISTS_PER_ROOT_WORD = 3.5
-"""Lists of the search structure, as a multiple of sqrt(V); measured at 20,000 words."""
+"""Lists of the search structure, as a multiple of sqrt(V): see docs/decisions/0022."""
+
+_WORDS_PER_LIST_SAMPLED = 32
+"""Words that centres are made from, as a multiple of their number."""
 
 _DISTANCE_SAMPLE = 10_000
+
+_SPARE_SHARE = 1.25
+"""How far a reservoir may fill beyond its size before it is cut back to it."""
+
+_OTHER_STREETS = 1.5
+_OWN_POINTS = 6.5
+"""How much farther from their words descriptors of other streets of a survey may lie."""
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
@@ -51,21 +62,28 @@ class WordSearcher:
     Parameters
     ----------
     codebook : the words.
-    index : what `build_search` gave for them, perhaps stored in between.
+    lists : what `build_search` gave for them, perhaps stored in between.
 
     Raises
     ------
-    VocabularyMismatch : the index was built for other words.
+    VocabularyMismatch : the lists are of other words.
     """
 
-    def __init__(self, codebook: Codebook, index: faiss.Index) -> None:
+    def __init__(self, codebook: Codebook, lists: WordLists) -> None:
         n_words, dimensions = codebook.words.shape
         self.codebook = codebook
-        self._table = WordTable(index)
-        if index.ntotal != n_words or self._table.dimensions < dimensions:
+        self._lists = lists
+        starts = lists.starts
+        whole = len(starts) == len(lists.centres) + 1 and starts[0] == 0 and starts[-1] == n_words
+        if (
+            (len(lists.word_ids), lists.centres.shape[1]) != (n_words, dimensions)
+            or not whole
+            or np.any(np.diff(starts) < 0)
+        ):
             raise VocabularyMismatch(
-                f"a search structure of {index.ntotal} words in {index.d} dimensions was opened "
-                f"for a codebook of {n_words} words in {dimensions}; build it from these words"
+                f"a search structure of {len(lists.word_ids)} words in {lists.centres.shape[1]} "
+                f"dimensions was opened for a codebook of {n_words} words in {dimensions}; "
+                "build it from these words"
             )
 
     def nearest(
@@ -92,7 +110,8 @@ class WordSearcher:
                 f"descriptors of shape {descriptors.shape} were looked up among words of "
                 f"{dimensions} dimensions; describe with the index's own settings"
             )
-        return self._table.nearest(descriptors, min(k, n_words))
+        words = self.codebook.words
+        return nearest_words(descriptors, words, self._lists, min(k, n_words))
 
 
 class SampleReservoir:
@@ -121,7 +140,7 @@ class SampleReservoir:
         self._keys.append(keys[wanted])
         self._descriptors.append(descriptors[wanted])
         self._n_held += int(wanted.sum())
-        if self._n_held > 2 * self._max_points:
+        if self._n_held > _SPARE_SHARE * self._max_points:
             self._shrink()
 
     def sample(self) -> NDArray[np.uint8]:
@@ -138,13 +157,15 @@ class SampleReservoir:
 
     def _shrink(self) -> None:
         keys, descriptors = np.concatenate(self._keys), np.concatenate(self._descriptors)
+        self._descriptors = []
         order = np.argsort(keys, kind="stable")
-        keys, descriptors = keys[order], descriptors[order]
+        keys = keys[order]
         repeats = np.flatnonzero(np.diff(keys) == 0)
         tied = np.union1d(repeats, repeats + 1)
-        descriptors[tied] = descriptors[tied[np.lexsort((*descriptors[tied].T[::-1], keys[tied]))]]
+        among = descriptors[order[tied]]
+        order[tied] = order[tied[np.lexsort((*among.T[::-1], keys[tied]))]]
         self._keys = [keys[: self._max_points].copy()]
-        self._descriptors = [descriptors[: self._max_points].copy()]
+        self._descriptors = [descriptors[order[: self._max_points]]]
         self._n_held = len(self._keys[0])
         if self._n_held == self._max_points:
             self._largest_of_use = self._keys[0][-1]
@@ -170,13 +191,14 @@ def sample_keys(image_sha256: str, n_frames: int, seed: int) -> NDArray[np.uint6
     return _mixed(_mixed(start) + np.arange(1, n_frames + 1, dtype=np.uint64) * _GOLDEN)
 
 
-def build_search(words: NDArray[np.uint8]) -> faiss.Index:
-    """Build the search structure of (V, D) uint8 words; `faiss.serialize_index` stores it."""
-    with one_thread():
-        if len(words) <= _EXHAUSTIVE_WORDS:
-            return exhaustive_index(words)
-        n_lists = round(_LISTS_PER_ROOT_WORD * np.sqrt(len(words)))
-        return list_index(words, flat_kmeans(words, n_lists, seed=0))
+def build_search(words: NDArray[np.uint8]) -> WordLists:
+    """Group (V, D) uint8 words for the search; the same lists for any order of the words."""
+    if len(words) <= _EXHAUSTIVE_WORDS:
+        return one_list(words)
+    n_lists = round(_LISTS_PER_ROOT_WORD * np.sqrt(len(words)))
+    sample = np.unique(words, axis=0)
+    sample = sample[:: max(len(sample) // (n_lists * _WORDS_PER_LIST_SAMPLED), 1)]
+    return lists_around(flat_kmeans(sample, n_lists, seed=0), words)
 
 
 def n_words_for(n_points: int, config: CodebookConfig) -> int:
@@ -185,10 +207,46 @@ def n_words_for(n_points: int, config: CodebookConfig) -> int:
     return min(wanted, config.max_words, config.max_train_points, n_points)
 
 
+def outgrown(
+    before: Mapping[str, float],
+    now: Mapping[str, float],
+    points_per_word: Mapping[str, float] | None = None,
+) -> tuple[str, ...]:
+    """Channels whose words no longer fit what is described.
+
+    Words lie nearer to the points they were made from than to any others, the more so the fewer
+    there were to a word: that much growth says nothing (measured: docs/decisions/0022).
+
+    Parameters
+    ----------
+    before, now : by channel, the mean squared distance of descriptors to their nearest word: of
+        those that an index was built from, and of those that come to it. A channel without a
+        distance above 0 before says nothing.
+    points_per_word : by channel, of those that the index was built from; where it is not known, as
+        few as there can be when a fifth as many words as points are made.
+
+    Returns
+    -------
+    channels : those in which it grew by more than a survey's own streets make it grow, in the
+        order of `now`.
+    """
+    points = points_per_word or {}
+    return tuple(
+        channel
+        for channel, sq_dist in now.items()
+        if 0 < before.get(channel, 0) * _usual_growth(points.get(channel, 5.0)) < sq_dist
+    )
+
+
+def _usual_growth(points_per_word: float) -> float:
+    return max(_OTHER_STREETS, 1 + _OWN_POINTS / math.sqrt(points_per_word))
+
+
 def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebook:
     """Make words by k-means; the same sample, number and seed give the same words.
 
-    Words equal after rounding are kept once, so fewer than `n_words` may come back.
+    Words equal after rounding are kept once, so fewer than `n_words` may come back. They come
+    list after list of their search structure: what is searched together is read in one go.
     A channel in which the survey has no descriptor gets a codebook without words.
 
     Parameters
@@ -209,6 +267,7 @@ def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebo
         nowhere = np.zeros(MAX_NEIGHBOURS, dtype=np.float32)
         return Codebook(sample.copy(), 0.0, nowhere, nowhere)
     words = np.unique(kmeans(sample, n_words, seed), axis=0)
+    words = words[build_search(words).word_ids]
     return Codebook(words, *_distance_range(sample[:_DISTANCE_SAMPLE], words))
 
 
@@ -224,8 +283,7 @@ def _distance_range(
 ) -> tuple[float, NDArray[np.float32], NDArray[np.float32]]:
     """dmin, dmax and d99 by exhaustive search; the last k stands in for more than V words."""
     width = min(MAX_NEIGHBOURS, len(words))
-    with one_thread():
-        _, sq_dist = WordTable(exhaustive_index(words)).nearest(sample, width)
+    _, sq_dist = nearest_words(sample, words, one_list(words), width)
     of_k = np.minimum(np.arange(MAX_NEIGHBOURS), width - 1)
     percentile = np.percentile(sq_dist, 99, axis=0, method="inverted_cdf").astype(np.float32)
     return float(sq_dist[:, 0].min()), sq_dist.max(axis=0)[of_k], percentile[of_k]

@@ -41,9 +41,10 @@ def fuse(
     n_images: int,
     config: SearchConfig,
     distinct_words: NDArray[np.int64] | None = None,
-    removed: NDArray[np.bool_] | None = None,
 ) -> Scores:
     """Score all images by the votes of all keypoints of one detector or more.
+
+    An image that is no candidate is in no list: scores are those of an index that never held it.
 
     Memory is that of the result, of the words asked for, and of a range of images.
 
@@ -52,18 +53,16 @@ def fuse(
     detectors : for each detector used its channels, all with the same n keypoints in one order.
     config : `vote`, `weights`, `max_images` (the T of the walk) and `union_distance` are used.
     distinct_words : (n_images,) int64, summed over the channels used; needed by `norm` alone.
-    removed : (n_images,) bool; scores are those of an index that never held these images.
 
     Raises
     ------
     BadConfig : the vote needs more descriptors, or a weight what was not given.
-    WrongInput : channels of one detector, or per-image arrays, differ in length.
+    WrongInput : channels of one detector, or `distinct_words` and images, differ in number.
     BadIndex : word or offset out of bounds, or images of a word out of bounds or order.
     VocabularyMismatch : an idf does not fit its postings.
     """
-    _check(detectors, n_images, config, distinct_words, removed)
-    gone = np.zeros(n_images, dtype=np.bool_) if removed is None else removed
-    asked = [_words(channels, config, read_only(gone, np.bool_)) for channels in detectors]
+    _check(detectors, n_images, config, distinct_words)
+    asked = [_words(channels, config, n_images) for channels in detectors]
     scores = Scores(np.zeros(n_images, dtype=np.float64), np.zeros(n_images, dtype=np.bool_))
     tally = _tally(min(n_images, _RANGE_IMAGES))
     for first in range(0, n_images, _RANGE_IMAGES):
@@ -74,8 +73,6 @@ def fuse(
             scores.values[images] /= np.sqrt(np.maximum(distinct_words[images], 1))
     if any(np.any(words.cursor < words.stop) for words in asked):
         raise beyond_catalogue(n_images)
-    if removed is not None:
-        scores.values[removed], scores.touched[removed] = 0.0, False
     return scores
 
 
@@ -98,9 +95,7 @@ def full_ranking(scores: Scores) -> NDArray[np.int64]:
     return np.lexsort((ids, -np.where(scores.touched, scores.values, 0.0), ~scores.touched))
 
 
-def _words(
-    channels: Sequence[ChannelQuery], config: SearchConfig, removed: NDArray[np.bool_]
-) -> Words:
+def _words(channels: Sequence[ChannelQuery], config: SearchConfig, n_images: int) -> Words:
     """List the words of a detector's keypoints that vote, and their votes."""
     lists = _lists(channels)
     spans = word_spans(channels)
@@ -109,14 +104,14 @@ def _words(
         # Whoever lacks a descriptor's images gives no vote anyway.
         taken, votes = spans[..., 0] < spans[..., 1], 1.0 - distances
     else:
-        taken = kept_words(lists, spans, removed)
+        taken = kept_words(lists, spans, n_images)
         if config.vote == "pairwise":
             votes = 1.0 - distances
         elif config.max_images is None:
             votes = union_votes(distances, taken, config.union_distance)
         else:
             votes, taken = walked_votes(
-                lists, spans, distances, taken, config.max_images, removed, config.union_distance
+                lists, spans, distances, taken, config.max_images, n_images, config.union_distance
             )
     votes = votes * word_factors(channels, use_idf="idf" in config.weights)
     point, descriptor, _ = np.nonzero(taken)
@@ -166,7 +161,6 @@ def _check(
     n_images: int,
     config: SearchConfig,
     distinct_words: NDArray[np.int64] | None,
-    removed: NDArray[np.bool_] | None,
 ) -> None:
     for channels in detectors:
         if not channels:
@@ -189,6 +183,5 @@ def _check(
                 )
     if "norm" in config.weights and distinct_words is None:
         raise BadConfig("the weight `norm` needs the images' distinct words; give them or drop it")
-    for name, array in (("distinct_words", distinct_words), ("removed", removed)):
-        if array is not None and len(array) != n_images:
-            raise WrongInput(f"{name} has {len(array)} entries for {n_images} images")
+    if distinct_words is not None and len(distinct_words) != n_images:
+        raise WrongInput(f"distinct_words has {len(distinct_words)} entries for {n_images} images")

@@ -17,7 +17,8 @@ _Floats = NDArray[np.float64]
 _Offsets = NDArray[np.int64]
 
 _OUT_OF_BOUNDS = -1
-_ALWAYS_SEEN = 255
+_MOST_JOINS = 255
+"""That can be told apart by a byte an image, which stays in the cache."""
 
 
 def walked_votes(
@@ -26,7 +27,7 @@ def walked_votes(
     distances: _Floats,
     kept: NDArray[np.bool_],
     max_images: int,
-    removed: NDArray[np.bool_],
+    n_images: int,
     distance: UnionDistance,
 ) -> tuple[_Floats, NDArray[np.bool_]]:
     """Give each word the sum of 1 - distance over the cells taken that it is in.
@@ -41,13 +42,13 @@ def walked_votes(
 
     Raises
     ------
-    BadIndex : an image beyond `removed` was met.
+    BadIndex : an image beyond `n_images` was met.
     """
     scale = 1.0 / kept.shape[1] if distance == "mean" else 1.0
     votes = np.zeros(kept.shape, dtype=np.float64)
     taken = np.zeros(kept.shape, dtype=np.bool_)
-    if not _walk(lists, spans, distances, kept, max_images, removed, scale, votes, taken):
-        raise beyond_catalogue(len(removed))
+    if not _walk(lists, spans, distances, kept, max_images, n_images, scale, votes, taken):
+        raise beyond_catalogue(n_images)
     return votes, taken
 
 
@@ -58,15 +59,13 @@ def _walk(
     distances: _Floats,
     kept: NDArray[np.bool_],
     max_images: int,
-    removed: NDArray[np.bool_],
+    n_images: int,
     scale: float,
     votes: _Floats,
     taken: NDArray[np.bool_],
 ) -> bool:
     n_points, n_descriptors, _ = kept.shape
-    # A byte an image stays in the cache; removed images always count as seen.
-    none_seen = np.where(removed, _ALWAYS_SEEN, 0).astype(np.uint8)
-    seen = none_seen.copy()
+    seen = np.zeros(n_images, dtype=np.uint8)
     token = 0
     for point in range(n_points):
         words = np.flatnonzero(kept[point, 0])
@@ -75,8 +74,8 @@ def _walk(
         cell_distance = distances[point, 0][words]
         for descriptor in range(1, n_descriptors):
             token += 1
-            if token == _ALWAYS_SEEN:
-                seen[:] = none_seen
+            if token > _MOST_JOINS:
+                seen[:] = 0
                 token = 1
             n_taken, cells, cell_distance = _join(
                 cells,
@@ -172,7 +171,6 @@ def _count_new(
         for image in lists[part][start:stop]:
             if image >= len(seen):
                 return _OUT_OF_BOUNDS
-            marked = seen[image]
-            fresh += marked < token
-            seen[image] = max(marked, token)
+            fresh += seen[image] < token
+            seen[image] = token
     return fresh

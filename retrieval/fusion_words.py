@@ -2,7 +2,7 @@
 
 All take n keypoints with L descriptors and k words each. `spans` (n, L, k, 2) int64 holds start
 and stop of each word's postings in its channel's image ids; they must have been checked.
-`distances` (n, L, k) float64 are the d' of METHOD section 3. `removed` has one entry an image.
+`distances` (n, L, k) float64 are the d' of METHOD section 3.
 """
 
 import numpy as np
@@ -15,21 +15,19 @@ from retrieval.kernels import kernel
 _Lists = tuple[NDArray[np.uint32], ...]
 
 
-def kept_words(
-    lists: _Lists, spans: NDArray[np.int64], removed: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def kept_words(lists: _Lists, spans: NDArray[np.int64], n_images: int) -> NDArray[np.bool_]:
     """Find the words that add an image to their keypoint; (n, L, k) bool.
 
-    An image counts for the nearest of a descriptor's words alone, and a removed one for none. A
-    keypoint of which a descriptor has no image at all is skipped: none of its words is kept.
+    An image counts for the nearest of a descriptor's words alone. A keypoint of which a
+    descriptor has no image at all is skipped: none of its words is kept.
 
     Raises
     ------
-    BadIndex : an image beyond `removed` was met.
+    BadIndex : an image beyond `n_images` was met.
     """
     kept = np.zeros(spans.shape[:3], dtype=np.bool_)
-    if not _keep_words(lists, spans, removed, kept):
-        raise beyond_catalogue(len(removed))
+    if not _keep_words(lists, spans, n_images, kept):
+        raise beyond_catalogue(n_images)
     complete = np.all(np.any(kept, axis=2), axis=1)
     kept &= complete[:, None, None]
     return kept
@@ -64,13 +62,12 @@ def beyond_catalogue(n_images: int) -> BadIndex:
 
 @kernel
 def _keep_words(
-    lists: _Lists, spans: NDArray[np.int64], removed: NDArray[np.bool_], kept: NDArray[np.bool_]
+    lists: _Lists, spans: NDArray[np.int64], n_images: int, kept: NDArray[np.bool_]
 ) -> bool:
     """Look for one image that a word has alone: mostly its first. False: out of bounds.
 
-    With nothing removed, a word of more images than all nearer ones together must have one.
+    A word of more images than all nearer ones together must have one.
     """
-    none_removed = not np.any(removed)
     for point in range(len(spans)):
         for descriptor in range(spans.shape[1]):
             image_ids = lists[descriptor]
@@ -78,19 +75,16 @@ def _keep_words(
             for rank in range(spans.shape[2]):
                 start, stop = spans[point, descriptor, rank]
                 length = stop - start
-                if none_removed and length > n_nearer:
+                if length > n_nearer:
                     kept[point, descriptor, rank] = True
                     start = stop
                 n_nearer += length
                 for image in image_ids[start:stop]:
-                    if image >= len(removed):
+                    if image >= n_images:
                         return False
-                    if removed[image] or _is_listed(
-                        image, image_ids, spans[point, descriptor, :rank]
-                    ):
-                        continue
-                    kept[point, descriptor, rank] = True
-                    break
+                    if not _is_listed(image, image_ids, spans[point, descriptor, :rank]):
+                        kept[point, descriptor, rank] = True
+                        break
     return True
 
 

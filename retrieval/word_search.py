@@ -1,150 +1,237 @@
 """Nearest words by (squared distance, word id), whatever the batch, order or machine.
 
-faiss computes the distances; among equal ones it keeps whichever its code path met first, so a
-few more neighbours are asked for, sorted here, and asked again where a tie may reach further.
-A neighbour is handled as one int64 key, distance << 32 | word id.
+Words are grouped in lists around centres; a descriptor is compared with the words of its nearest
+lists. Descriptors and words are whole numbers, and so is every sum: it is exact in any order.
+A neighbour is handled as one int64 key, distance << 32 | word id, so that the smaller key is the
+nearer word and, among equals, the smaller id.
 """
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import TypeVar
 
-import faiss
 import numpy as np
 from numpy.typing import NDArray
 
-N_PROBES = 16
-"""Lists searched. The exact nearest word is found for 0.990 of RootSIFT descriptors among 20,000
-words, for 0.959 among 80,000; the two nearest for 0.984 and 0.935."""
+from contracts.errors import BadIndex, WrongInput
+from retrieval.kernels import kernel
 
-_SPARE = 3
-"""Neighbours asked beyond those wanted, so that most ties are settled at once."""
+_PROBES_PER_ROOT_LIST = 0.72
+"""Lists searched, as a multiple of sqrt(C): see docs/decisions/0022."""
 
-_BATCH = 4_096
-
-_Keys = NDArray[np.int64]
-_Rows = NDArray[np.int64]
-_Search = Callable[[_Rows, int], _Keys]
+_BATCH = 8_192
+_BLOCK = 64
+"""Words widened at a time: with 128 dimensions they fill half of a first-level cache."""
 
 _MISSING = np.iinfo(np.int64).max
 
-
-class WordTable:
-    """A faiss index of whole-number words: exhaustive, or lists around coarse centres."""
-
-    def __init__(self, index: faiss.Index, n_probes: int = N_PROBES) -> None:
-        self._n_probes = n_probes
-        self._owner = index  # the downcast one lives no longer than this
-        self._index: Any = faiss.downcast_index(index)  # its class decides what it offers
-        self.dimensions: int = index.d
-        self.n_words: int = index.ntotal
-        self._coarse: WordTable | None = None
-        if isinstance(self._index, faiss.IndexIVF):
-            self._coarse = WordTable(self._index.quantizer)
-
-    def nearest(
-        self, descriptors: NDArray[np.uint8], k: int
-    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Find k words of each descriptor.
-
-        Parameters
-        ----------
-        descriptors : (n, D) uint8, D at most the table's; what lacks is zero.
-        k : at most the number of words.
-
-        Returns
-        -------
-        word_ids : (n, k) int32. sq_dist : (n, k) float32.
-        """
-        word_ids = np.empty((len(descriptors), k), dtype=np.int32)
-        sq_dist = np.empty((len(descriptors), k), dtype=np.float32)
-        for start in range(0, len(descriptors) if k else 0, _BATCH):
-            rows = slice(start, min(start + _BATCH, len(descriptors)))
-            points = np.zeros((rows.stop - start, self.dimensions), dtype=np.float32)
-            points[:, : descriptors.shape[1]] = descriptors[rows]
-            keys = self._nearest_keys(points, k)
-            word_ids[rows] = keys & 0xFFFFFFFF
-            sq_dist[rows] = keys >> 32
-        return word_ids, sq_dist
-
-    def _nearest_keys(self, points: NDArray[np.float32], k: int) -> _Keys:
-        if self._coarse is None:
-            return _settled(self._exhaustive(points), len(points), k, self.n_words)
-        n_probes = min(self._n_probes, self._coarse.n_words)
-        search = self._among_lists(points, self._coarse._nearest_keys(points, n_probes))
-        keys = _settled(search, len(points), k, self.n_words)
-        short = np.flatnonzero(keys[:, -1] == _MISSING)  # the probed lists hold fewer than k
-        if len(short):
-            everywhere = self._coarse._nearest_keys(points[short], self._coarse.n_words)
-            search = self._among_lists(points[short], everywhere)
-            keys[short] = _settled(search, len(short), k, self.n_words)
-        return keys
-
-    def _exhaustive(self, points: NDArray[np.float32]) -> _Search:
-        def search(rows: _Rows, asked: int) -> _Keys:
-            return _sorted_keys(*self._index.search(points[rows], asked))
-
-        return search
-
-    def _among_lists(self, points: NDArray[np.float32], probes: _Keys) -> _Search:
-        lists, distances = probes & 0xFFFFFFFF, (probes >> 32).astype(np.float32)
-
-        def search(rows: _Rows, asked: int) -> _Keys:
-            self._index.nprobe = probes.shape[1]
-            return _sorted_keys(
-                *self._index.search_preassigned(points[rows], asked, lists[rows], distances[rows])
-            )
-
-        return search
+_Number = TypeVar("_Number", bound=np.generic)
+_Points = NDArray[np.int16]
+_Keys = NDArray[np.int64]
+_Rows = NDArray[np.int64]
+_Scan = Callable[
+    [_Points, NDArray[np.uint8], NDArray[np.int32], _Rows, _Rows, NDArray[np.int32], _Keys], int
+]
 
 
-def exhaustive_index(words: NDArray[np.uint8]) -> faiss.Index:
-    """Index (V, D) words for comparing with every one of them."""
-    index = faiss.IndexFlatL2(words.shape[1])
-    index.add(words.astype(np.float32))
-    return index
+@dataclass(frozen=True, slots=True)
+class WordLists:
+    """Words by their nearest centre.
 
-
-def list_index(words: NDArray[np.uint8], coarse: NDArray[np.uint8]) -> faiss.Index:
-    """Index (V, D) words by their nearest of (C, D) coarse centres.
-
-    Words are kept as bytes, filled with zeros to a multiple of 16 dimensions: faiss then
-    compares them as whole numbers, exact and faster than floats (26 against 42 us a query in
-    one measurement, and a quarter of the memory).
+    centres : (C, D) uint8. starts : (C+1,) int64, where in `word_ids` a centre's list starts.
+    word_ids : (V,) int32, every word once, ascending within a list.
     """
-    filling = -words.shape[1] % 16
-    words, coarse = (np.pad(array, ((0, 0), (0, filling))) for array in (words, coarse))
-    index = faiss.IndexIVFScalarQuantizer(
-        exhaustive_index(coarse),
-        words.shape[1],
-        len(coarse),
-        faiss.ScalarQuantizer.QT_8bit_direct,
-        faiss.METRIC_L2,
-        False,  # by_residual: differences to a centre would not fit a byte
+
+    centres: NDArray[np.uint8]
+    starts: NDArray[np.int64]
+    word_ids: NDArray[np.int32]
+
+
+def one_list(words: NDArray[np.uint8]) -> WordLists:
+    """A single list of (V, D) words: a descriptor is compared with every one."""
+    centre = np.zeros((1, words.shape[1]), dtype=np.uint8)
+    return WordLists(
+        centre, np.array([0, len(words)], dtype=np.int64), np.arange(len(words), dtype=np.int32)
     )
-    index.train(words.astype(np.float32))
-    index.add(words.astype(np.float32))
-    return index
 
 
-def _settled(search: _Search, n_rows: int, k: int, n_words: int) -> _Keys:
-    """Ask for more neighbours until no tie at the k-th can hide a smaller word id."""
-    asked = min(k + _SPARE, n_words)
-    rows = np.arange(n_rows)
-    found = search(rows, asked)
-    keys = found[:, :k].copy()
-    while asked < n_words:
-        rows = rows[(found[:, k - 1] >> 32 == found[:, -1] >> 32) & (found[:, -1] != _MISSING)]
-        if not len(rows):
-            break
-        asked = min(4 * asked, n_words)
-        found = search(rows, asked)
-        keys[rows] = found[:, :k]
+def lists_around(centres: NDArray[np.uint8], words: NDArray[np.uint8]) -> WordLists:
+    """Group (V, D) words by the nearest of (C, D) centres."""
+    of_word = nearest_words(words, centres, one_list(centres), 1)[0][:, 0]
+    starts = np.zeros(len(centres) + 1, dtype=np.int64)
+    np.cumsum(np.bincount(of_word, minlength=len(centres)), out=starts[1:])
+    return WordLists(centres, starts, np.argsort(of_word, kind="stable").astype(np.int32))
+
+
+def nearest_words(
+    descriptors: NDArray[np.uint8],
+    words: NDArray[np.uint8],
+    lists: WordLists,
+    k: int,
+    n_probes: int | None = None,
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Find k words of each descriptor.
+
+    Parameters
+    ----------
+    descriptors : (n, D) uint8. words : (V, D) uint8. lists : of these words.
+    k : at most V. n_probes : lists searched; all, where these hold fewer than k words. None: as
+        many as find 0.95 of the nearest words of real descriptors, or more.
+
+    Returns
+    -------
+    word_ids : (n, k) int32. sq_dist : (n, k) float32, exact.
+
+    Raises
+    ------
+    BadIndex : the lists name words that are not there.
+    WrongInput : more than 128 dimensions.
+    """
+    word_ids = np.empty((len(descriptors), k), dtype=np.int32)
+    sq_dist = np.empty((len(descriptors), k), dtype=np.float32)
+    if n_probes is None:
+        n_probes = max(round(_PROBES_PER_ROOT_LIST * np.sqrt(len(lists.centres))), 1)
+    for start in range(0, len(descriptors) if k else 0, _BATCH):
+        rows = slice(start, start + _BATCH)
+        keys = _nearest_keys(_widened(descriptors[rows]), words, lists, k, n_probes)
+        word_ids[rows] = keys & 0xFFFFFFFF
+        sq_dist[rows] = keys >> 32
+    return word_ids, sq_dist
+
+
+def compile_word_search() -> None:
+    """Compile every loop of a search, before the first photo or shard waits for it."""
+    for width in _SCANS:
+        words = np.arange(64, dtype=np.uint8)[:, None].repeat(width, axis=1)
+        nearest_words(words, words, lists_around(words, words), 1)
+
+
+def _nearest_keys(
+    points: _Points, words: NDArray[np.uint8], lists: WordLists, k: int, n_probes: int
+) -> _Keys:
+    n_lists = len(lists.centres)
+    if n_lists <= n_probes:
+        return _among_all(points, words, lists, k)
+    centres = _among_all(points, lists.centres, one_list(lists.centres), n_probes)
+    starts, rows = _by_list(centres, n_lists)
+    keys = _scanned(points, words, lists, starts, rows, k)
+    short = np.flatnonzero(keys[:, -1] == _MISSING)
+    if len(short):
+        keys[short] = _among_all(points[short], words, lists, k)
     return keys
 
 
-def _sorted_keys(distances: NDArray[np.float32], word_ids: NDArray[np.int64]) -> _Keys:
-    found = word_ids >= 0
-    keys = np.where(found, distances, 0).astype(np.int64) << 32 | word_ids
-    keys[~found] = _MISSING
-    keys.sort(axis=1)
+def _among_all(points: _Points, words: NDArray[np.uint8], lists: WordLists, k: int) -> _Keys:
+    n_lists = len(lists.centres)
+    starts = np.arange(n_lists + 1, dtype=np.int64) * len(points)
+    rows = np.tile(np.arange(len(points), dtype=np.int32), n_lists)
+    return _scanned(points, words, lists, starts, rows, k)
+
+
+def _scanned(
+    points: _Points,
+    words: NDArray[np.uint8],
+    lists: WordLists,
+    starts: _Rows,
+    rows: NDArray[np.int32],
+    k: int,
+) -> _Keys:
+    keys = np.full((len(points), k), _MISSING, dtype=np.int64)
+    scan = _SCANS[points.shape[1]]
+    stray = scan(
+        points, _sealed(words), _sealed(lists.word_ids), _sealed(lists.starts), starts, rows, keys
+    )
+    if stray >= 0:
+        raise BadIndex(
+            f"a search structure names word {lists.word_ids[stray]} of {len(words)}; "
+            "restore the codebook or index again"
+        )
     return keys
+
+
+def _sealed(array: NDArray[_Number]) -> NDArray[_Number]:
+    """A view as a mapped file gives it: the loops are compiled for that alone."""
+    view = np.ascontiguousarray(array).view()
+    view.flags.writeable = False
+    return view
+
+
+def _widened(descriptors: NDArray[np.uint8]) -> _Points:
+    """Descriptors as int16, filled with zeros to a width that there is a loop for."""
+    width = next((width for width in _SCANS if width >= descriptors.shape[1]), None)
+    if width is None:
+        raise WrongInput(
+            f"descriptors of {descriptors.shape[1]} dimensions cannot be searched for; "
+            f"at most {max(_SCANS)} keep their distances exact"
+        )
+    points = np.zeros((len(descriptors), width), dtype=np.int16)
+    points[:, : descriptors.shape[1]] = descriptors
+    return points
+
+
+@kernel
+def _by_list(centres: _Keys, n_lists: int) -> tuple[_Rows, NDArray[np.int32]]:
+    """Turn the lists of each row into the rows of each list, ascending."""
+    starts = np.zeros(n_lists + 1, dtype=np.int64)
+    for key in centres.ravel():
+        starts[(key & 0xFFFFFFFF) + 1] += 1
+    for which in range(n_lists):
+        starts[which + 1] += starts[which]
+    rows = np.empty(centres.size, dtype=np.int32)
+    filled = starts.copy()
+    for row in range(centres.shape[0]):
+        for probe in range(centres.shape[1]):
+            which = centres[row, probe] & 0xFFFFFFFF
+            rows[filled[which]] = row
+            filled[which] += 1
+    return starts, rows
+
+
+def _scan_of(width: int) -> _Scan:
+    """Compile the search for points of one width: known to the compiler, it becomes vectors."""
+
+    @kernel
+    def scan(
+        points: _Points,
+        words: NDArray[np.uint8],
+        word_ids: NDArray[np.int32],
+        list_starts: _Rows,
+        row_starts: _Rows,
+        rows: NDArray[np.int32],
+        keys: _Keys,
+    ) -> int:
+        """Sort the words of each list into the keys of its rows; the place of a stray id, or -1."""
+        last = keys.shape[1] - 1
+        block = np.zeros((_BLOCK, width), dtype=np.int16)
+        for which in range(len(list_starts) - 1):
+            if row_starts[which] == row_starts[which + 1]:
+                continue
+            for start in range(list_starts[which], list_starts[which + 1], _BLOCK):
+                n_words = min(_BLOCK, list_starts[which + 1] - start)
+                for place in range(n_words):
+                    word = word_ids[start + place]
+                    if word < 0 or word >= words.shape[0]:
+                        return start + place
+                    for axis in range(words.shape[1]):
+                        block[place, axis] = words[word, axis]
+                for row in rows[row_starts[which] : row_starts[which + 1]]:
+                    farthest = keys[row, last]
+                    for place in range(n_words):
+                        sq_dist = np.int32(0)
+                        for axis in range(width):
+                            apart = np.int16(points[row, axis] - block[place, axis])
+                            sq_dist = np.int32(sq_dist + np.int32(np.int32(apart) * apart))
+                        key = np.int64(sq_dist) << 32 | word_ids[start + place]
+                        if key < farthest:
+                            at = last
+                            while at > 0 and keys[row, at - 1] > key:
+                                keys[row, at] = keys[row, at - 1]
+                                at -= 1
+                            keys[row, at] = key
+                            farthest = keys[row, last]
+        return -1
+
+    return scan
+
+
+_SCANS: dict[int, _Scan] = {width: _scan_of(width) for width in (64, 128)}

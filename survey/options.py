@@ -1,13 +1,11 @@
 """How a survey is to be read, what comes out, and what a reader of one format is."""
 
-import fnmatch
-import re
-import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from contracts.config import North
+from contracts.globs import glob_matcher
 from contracts.records import PosedImage, Skipped
 
 
@@ -99,11 +97,10 @@ class Reader:
 def selector(options: ReadOptions) -> Callable[[str], bool]:
     """Which local uris are asked for by `include` and `exclude`.
 
-    As in `fnmatch`, `*` also crosses `/`; `**/` also stands for no folder at all. A pattern
-    without `/` may match the file's name alone. Case counts.
+    Both are globs (contracts/globs.py).
     """
-    include = [_compiled(pattern) for pattern in options.include]
-    exclude = [_compiled(pattern) for pattern in options.exclude]
+    include = [glob_matcher(pattern) for pattern in options.include]
+    exclude = [glob_matcher(pattern) for pattern in options.exclude]
 
     def wanted(local_uri: str) -> bool:
         uri = options.uri(local_uri)
@@ -112,21 +109,3 @@ def selector(options: ReadOptions) -> Callable[[str], bool]:
         return not any(matches(uri) for matches in exclude)
 
     return wanted
-
-
-def _compiled(pattern: str) -> Callable[[str], bool]:
-    pieces = [
-        fnmatch.translate(piece) for piece in unicodedata.normalize("NFC", pattern).split("**/")
-    ]
-    bodies = [
-        piece.removeprefix("(?s:").removesuffix(")\\Z").removesuffix(")\\z") for piece in pieces
-    ]
-    expression = re.compile("(?:.*/)?".join(bodies), re.DOTALL)
-    by_name = "/" not in pattern
-
-    def matches(uri: str) -> bool:
-        if expression.fullmatch(uri):
-            return True
-        return by_name and expression.fullmatch(uri.rpartition("/")[2]) is not None
-
-    return matches

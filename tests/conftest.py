@@ -18,7 +18,8 @@ from contracts.config import IndexConfig
 from coordinator.cli.show import Bars
 from coordinator.engine import Engine, running_engine
 from coordinator.indexing import run_job
-from coordinator.plan import make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import make_plan
 from index.opened import OpenedIndex
 from survey import ReadOptions
 

@@ -21,6 +21,7 @@ def make_app(broker_url: str | None = None) -> Celery:
         task_queues=[Queue(name, Exchange(name), routing_key=name) for name in QUEUES],
         task_routes={
             **{f"flaneur.{name}": {"queue": name} for name in QUEUES},
+            "flaneur.join": {"queue": "merge"},
             "flaneur.judge": {"queue": "locate"},
             "flaneur.rehearse": {"queue": "locate"},
         },

@@ -48,8 +48,20 @@ class AssignMessage(_JobMessage):
 
 
 class MergeMessage(_JobMessage):
+    """Words first_word to stop_word - 1. n_images : of the segment to be."""
+
     channel: str
     n_images: Annotated[int, Field(ge=0)]
+    first_word: Annotated[int, Field(ge=0)]
+    stop_word: Annotated[int, Field(ge=0)]
+
+
+class JoinMessage(_JobMessage):
+    """`first_words` : of each range that was merged, ascending."""
+
+    channel: str
+    n_images: Annotated[int, Field(ge=0)]
+    first_words: tuple[int, ...]
 
 
 class LocateMessage(Message):

@@ -1,6 +1,7 @@
 """Running a worker: threads, caches and warm kernels first, then Celery's own loop."""
 
 import os
+import resource
 import signal
 import threading
 from collections.abc import Sequence
@@ -33,6 +34,9 @@ def run_worker(
     broker_url: str, queues: Sequence[str], n_processes: int, *, with_parent: bool, name: str
 ) -> None:
     """Work until told to stop. with_parent : stop, server and all, when stdin closes."""
+    # Every mapped array holds a file: an index of many segments has more than the usual 1,024.
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     import cv2
     import faiss
 

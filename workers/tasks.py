@@ -12,7 +12,8 @@ from workers.app import app
 from workers.lease import lease
 from workers.stages.assign import assign_shard
 from workers.stages.extract import extract_shard
-from workers.stages.merge import merge_channel
+from workers.stages.join import join_channel
+from workers.stages.merge import merge_words
 from workers.stages.train import train_channel
 
 Json = dict[str, Any]
@@ -54,7 +55,15 @@ def assign(message: object) -> Json:
 @_task("merge")
 def merge(message: object) -> Json:
     request = messages.MergeMessage.parse(message)
-    return _brief(merge_channel(request.folder(), request.channel, request.n_images))
+    words = range(request.first_word, request.stop_word)
+    return _brief(merge_words(request.folder(), request.channel, words, request.n_images))
+
+
+@_task("join")
+def join(message: object) -> Json:
+    request = messages.JoinMessage.parse(message)
+    folder, pieces = request.folder(), request.first_words
+    return _brief(join_channel(folder, request.channel, pieces, request.n_images))
 
 
 @_task("locate")

@@ -69,8 +69,8 @@ def _summary(report: "DemoReport", seconds: float) -> str:
     return (
         f"Within {RIGHT_WITHIN_M:.0f} m and on the right facade: "
         f"Flaneur {right[0]} of {len(rows)}, bag of words {right[1]}, random {right[2]}.\n"
-        f"{generation.n_images} images indexed, {report.index.images_extracted} of them now, "
-        f"{report.index.bytes_on_disk / max(generation.n_images, 1):,.0f} bytes an image; "
+        f"{generation.n_live} images indexed, {report.index.images_extracted} of them now, "
+        f"{report.index.bytes_on_disk / max(generation.n_live, 1):,.0f} bytes an image; "
         f"{report.seconds_per_photo:.2f} s a photo; {seconds:.0f} s in all.\n"
         f"Open {report.page} in a browser, and {report.geopackage} in QGIS."
     )

@@ -56,7 +56,7 @@ def command(
     from coordinator.evaluating import report_of, table_of, write_sheets
     from coordinator.export.files import write_whole
     from coordinator.querying import judge_queries
-    from coordinator.truth import read_truth
+    from coordinator.truth import truth_of_index
     from index.opened import OpenedIndex
 
     search = search_config(pair, k, vote, weights, descriptors, top=10)
@@ -65,8 +65,7 @@ def command(
     out = None if out is None else result_folder(out)
     if tables and out is None:
         raise BadConfig("--tables writes several files; name a folder with --out")
-    catalogue = opened.catalogue
-    queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
+    queries = truth_of_index(opened, truth, root)
     if tables:
         check_comparable(opened, queries)
     with running_engine(broker, workers, ("locate",)) as engine, bars() as progress:

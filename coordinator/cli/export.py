@@ -83,9 +83,9 @@ def stac(
     opened = OpenedIndex(index.absolute())
     folder = folder.absolute()
     with bars() as progress:
-        progress.begin("stac", opened.n_images, 0)
+        progress.begin("stac", opened.n_live, 0)
         write_stac(opened, folder, lambda: progress.advance("stac"))
-    tell(f"{opened.n_images} items: {folder / 'collection.json'}")
+    tell(f"{opened.n_live} items: {folder / 'collection.json'}")
 
 
 def navplace(

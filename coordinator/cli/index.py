@@ -2,9 +2,9 @@
 
 import json
 import time
-import unicodedata
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -25,107 +25,100 @@ from coordinator.cli.lists import (
     names_among,
 )
 from coordinator.cli.show import bars, complain, list_skipped, tell
-from coordinator.cli.survey_options import (
-    AllowBallpark,
-    Crs,
-    Exclude,
-    Format,
-    Include,
-    Mapping,
-    MaxGap,
-    NoPose,
-    North,
-    NoTrackHeadings,
-    SurveyPath,
-    WholePanoramas,
-)
+from coordinator.cli.survey_options import Also, ShardSize, SurveyPath, reads_a_survey, survey_name
+
+if TYPE_CHECKING:  # reading a survey imports much
+    from survey import ReadOptions
 
 NAME = "index"
 
+Detectors = Annotated[
+    str | None,
+    typer.Option(help=f"Which to run; default: {','.join(DETECTORS)}, or those of --codebooks."),
+]
+Descriptors = Annotated[
+    str | None,
+    typer.Option(help=f"Which to run; default: {','.join(DESCRIPTORS)}, or those of --codebooks."),
+]
+MaxWords = Annotated[
+    int | None,
+    typer.Option(help=f"Largest codebook; default: {CodebookConfig().max_words}."),
+]
 
+
+@reads_a_survey
 def command(
     survey: SurveyPath,
     index: Annotated[Path, typer.Argument(help="Where the index goes.")],
-    also: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=SURVEY", help="Another survey; its uris begin with NAME/."),
-    ] = None,
-    include: Include = None,
-    exclude: Exclude = None,
-    crs: Crs = None,
-    north: North = None,
-    no_pose: NoPose = False,
-    survey_format: Format = None,
-    mapping: Mapping = None,
-    max_gap: MaxGap = 1.0,
-    whole_panoramas: WholePanoramas = False,
-    no_track_headings: NoTrackHeadings = False,
-    allow_ballpark: AllowBallpark = False,
-    detectors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DETECTORS),
-    descriptors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DESCRIPTORS),
+    reading: "ReadOptions",
+    also: Also = None,
+    detectors: Detectors = None,
+    descriptors: Descriptors = None,
     max_frames: MaxFrames = None,
-    max_words: Annotated[int, typer.Option(help="Largest codebook.")] = 20_000,
-    seed: Annotated[int, typer.Option(help="Seed of the codebooks.")] = 0,
-    stored_rotation: Annotated[
-        bool,
-        typer.Option("--stored-rotation", help="Leave images as stored, not put upright."),
-    ] = False,
-    no_masks: Annotated[
-        bool, typer.Option("--no-masks", help="Ignore the survey's masks.")
-    ] = False,
-    shard_size: Annotated[
-        int | None, typer.Option(min=1, max=10_000, help="Images a task.")
+    max_words: MaxWords = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the codebooks; default: 0.")] = None,
+    codebooks: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SOURCE",
+            help="Use the words of another index, or of a folder that `flaneur codebook import` "
+            "wrote, instead of training some.",
+        ),
     ] = None,
+    shard_size: ShardSize = None,
     workers: Workers = None,
     broker: Broker = None,
     as_json: Annotated[bool, typer.Option("--json", help="Report as JSON on stdout.")] = False,
 ) -> int:
     """Index a survey. Run again, it does only what is missing."""
+    from coordinator.adding import before_replacing
     from coordinator.engine import running_engine
     from coordinator.indexing import run_job
-    from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
-    from survey import ReadOptions
+    from coordinator.intake import read_surveys
+    from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
+    from coordinator.reusing import config_of_words, misfit, take_over
+    from index.importing import words_to_import
+    from index.word_sets import open_words
 
-    config = IndexConfig(
-        features=FeatureConfig.of(
-            detectors=names_among(detectors, DETECTORS, "--detectors"),
-            descriptors=names_among(descriptors, DESCRIPTORS, "--descriptors"),
-            **frame_limits(max_frames or ""),
-        ),
-        codebooks=CodebookConfig.of(max_words=max_words, seed=seed),
-    )
-    options = ReadOptions(
-        crs=crs,
-        north=north,
-        no_pose=no_pose,
-        include=tuple(include or ()),
-        exclude=tuple(exclude or ()),
-        format=survey_format,
-        make_upright=not stored_rotation,
-        use_masks=not no_masks,
-        mapping=mapping,
-        max_gap_s=max_gap,
-        cut_panoramas=not whole_panoramas,
-        derive_headings=not no_track_headings,
-        allow_ballpark=allow_ballpark,
-    )
-    started = time.perf_counter()
     root = index.absolute()
-    intake = read_surveys([("", survey.absolute()), *map(_named, also or ())], options)
-    job, plan = make_plan(root, intake, config, shard_size or DEFAULT_SHARD_SIZE)
+    if codebooks is None:
+        source = words = None
+        config = _trained(detectors, descriptors, max_frames, max_words, seed)
+    else:
+        _refuse_training(max_words, seed)
+        source = open_words(codebooks.absolute())
+        config = config_of_words(
+            source.words,
+            names_among(detectors, DETECTORS, "--detectors"),
+            names_among(descriptors, DESCRIPTORS, "--descriptors"),
+            frame_limits(max_frames) if max_frames else {},
+        )
+        words = words_to_import(root, source, config.features.channels())
+    started = time.perf_counter()
+    intake = read_surveys([("", survey.absolute()), *map(named_survey, also or ())], reading)
+    job, plan = make_plan(root, intake, config, shard_size or DEFAULT_SHARD_SIZE, words)
+    if source is not None and words is not None:
+        take_over(job, source, words)
     for note in intake.notes:
         tell(note)
+    if warning := before_replacing(job, plan, intake):
+        complain(warning)
     tell(f"{len(intake.images)} images in {plan.n_shards} shards; job {plan.job}")
     with bars() as progress:
         report = run_job(job, plan, intake, running_engine(broker, workers), progress)
+    generation = report.generation
     for warning in report.warnings:
         complain(warning)
+    if source is not None:
+        here = generation.segments[0].quantisation
+        warning = misfit(source.words.quantisation, here, "without --codebooks words are trained")
+        if warning:
+            complain(warning)
     list_skipped(report.skipped, str(job.path / "skipped.json"))
-    generation = report.generation
     seconds = time.perf_counter() - started
     summary = {
         "generation": generation.number,
-        "images": generation.n_images,
+        "images": generation.n_live,
         "extracted_now": report.images_extracted,
         "skipped": [{"uri": each.uri, "reason": each.reason} for each in report.skipped],
         "without_keypoints": report.without_frames,
@@ -141,11 +134,52 @@ def command(
     return SOME_SKIPPED if report.skipped else 0
 
 
-def _named(text: str) -> tuple[str, Path]:
+def _trained(
+    detectors: str | None,
+    descriptors: str | None,
+    max_frames: str | None,
+    max_words: int | None,
+    seed: int | None,
+) -> IndexConfig:
+    limits = {"max_words": max_words, "seed": seed}
+    return IndexConfig(
+        features=FeatureConfig.of(
+            detectors=names_among(_or_all(detectors, DETECTORS), DETECTORS, "--detectors"),
+            descriptors=names_among(
+                _or_all(descriptors, DESCRIPTORS), DESCRIPTORS, "--descriptors"
+            ),
+            **frame_limits(max_frames or ""),
+        ),
+        codebooks=CodebookConfig.of(
+            **{name: value for name, value in limits.items() if value is not None}
+        ),
+    )
+
+
+def _refuse_training(max_words: int | None, seed: int | None) -> None:
+    if max_words is not None or seed is not None:
+        raise BadConfig(
+            "--max-words and --seed are for training words, and with --codebooks none are "
+            "trained. Leave these away, or --codebooks."
+        )
+
+
+def _or_all(text: str | None, known: Sequence[str]) -> str:
+    return ",".join(known) if text is None else text
+
+
+def named_survey(text: str) -> tuple[str, Path]:
+    """Read `NAME=SURVEY` of --also.
+
+    Raises
+    ------
+    BadConfig : it is something else.
+    """
     name, separator, path = text.partition("=")
-    if not (separator and name and path) or "/" in name or name in {".", ".."}:
-        raise BadConfig(f"--also takes NAME=SURVEY, with no / in NAME; got {text!r}")
-    return unicodedata.normalize("NFC", name), Path(path).absolute()
+    refused = f"--also takes NAME=SURVEY, with no / in NAME; got {text!r}"
+    if not (separator and name and path):
+        raise BadConfig(refused)
+    return survey_name(name, refused), Path(path).absolute()
 
 
 def _sentence(summary: dict[str, object], root: Path) -> str:

@@ -21,6 +21,16 @@ from coordinator.cli.lists import (
 )
 from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
+from coordinator.cli.where_options import (
+    Bbox,
+    Heading,
+    InSurvey,
+    Since,
+    Until,
+    Uri,
+    Within,
+    where_of,
+)
 
 if TYPE_CHECKING:
     from coordinator.querying import Located
@@ -45,6 +55,13 @@ def command(
     vote: Vote = "auto",
     weights: Weights = "idf,norm",
     descriptors: Descriptors = None,
+    bbox: Bbox = None,
+    within: Within = None,
+    since: Since = None,
+    until: Until = None,
+    heading: Heading = None,
+    survey: InSurvey = None,
+    uri: Uri = None,
     workers: Workers = None,
     broker: Broker = None,
 ) -> int:
@@ -57,7 +74,7 @@ def command(
         refuse_unwritable,
         write_results,
     )
-    from coordinator.querying import locate_photos
+    from coordinator.querying import locate_photos, searched
     from index.opened import OpenedIndex
 
     search = search_config(pair, k, vote, weights, descriptors, top)
@@ -67,7 +84,11 @@ def command(
     outs = [result_file(each, map(Path, photos)) for each in out or ()]
     refuse_unknown(outs)
     refuse_unwritable(outs)
-    about = provenance(opened)
+    where = where_of(
+        opened.generation, bbox, within, since, until, heading, surveys=survey, uris=uri
+    )
+    search = search.model_copy(update={"where": where})
+    about = {**provenance(opened), "searched": searched(opened, where)}
     tally = _Tally()
     count = min(workers or len(photos), len(photos)) if broker is None else None
     with running_engine(broker, _at_most_cores(count), ("locate",)) as engine, bars() as progress:

@@ -9,7 +9,25 @@ from typing import Annotated
 import typer
 
 from contracts.errors import FlaneurError, WrongInput
-from coordinator.cli import demo, doctor, evaluate, export, index, inspect, locate, train, worker
+from coordinator.cli import (
+    add,
+    codebook,
+    compact,
+    demo,
+    doctor,
+    evaluate,
+    export,
+    index,
+    inspect,
+    locate,
+    plan,
+    remove,
+    rollback,
+    status,
+    train,
+    verify,
+    worker,
+)
 from coordinator.cli.show import complain
 
 FAILED, WRONG_USAGE = 1, 2
@@ -62,14 +80,18 @@ main = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (demo, index):
+for verb in (demo, index, add, compact):
     main.command(verb.NAME)(_guarded(verb.command, RESUMED))
-for verb in (doctor, locate, inspect, train, evaluate, worker):
+for verb in (
+    *(doctor, plan, locate, inspect, train, evaluate),
+    *(remove, rollback, status, verify, worker),
+):
     main.command(verb.NAME)(_guarded(verb.command))
-exports = typer.Typer(no_args_is_help=True, help=export.HELP)
-for name, command in export.COMMANDS.items():
-    exports.command(name)(_guarded(command))
-main.add_typer(exports, name=export.NAME)
+for group in (export, codebook):
+    verbs = typer.Typer(no_args_is_help=True, help=group.HELP)
+    for name, command in group.COMMANDS.items():
+        verbs.command(name)(_guarded(command))
+    main.add_typer(verbs, name=group.NAME)
 
 
 @main.callback()

@@ -1,11 +1,19 @@
-"""How a survey is to be read: the options that `index`, `doctor` and `export` share."""
+"""How a survey is to be read: the options that verbs share."""
 
+import unicodedata
+from collections.abc import Callable
+from functools import wraps
+from inspect import Signature, signature
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from contracts.config import North as NorthName
+from contracts.errors import BadConfig
+
+if TYPE_CHECKING:  # reading a survey imports much
+    from survey import ReadOptions
 
 SurveyPath = Annotated[
     Path, typer.Argument(help="A folder, a pose table, or an MCAP file; see docs/surveys.md.")
@@ -53,3 +61,88 @@ AllowBallpark = Annotated[
         help="Accept a conversion to WGS 84 of unknown accuracy, where there is no other.",
     ),
 ]
+
+
+StoredRotation = Annotated[
+    bool, typer.Option("--stored-rotation", help="Leave images as stored, not put upright.")
+]
+NoMasks = Annotated[bool, typer.Option("--no-masks", help="Ignore the survey's masks.")]
+Also = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME=SURVEY", help="Another survey; its uris begin with NAME/."),
+]
+ShardSize = Annotated[int | None, typer.Option(min=1, max=10_000, help="Images a task.")]
+
+
+def reading_options(
+    include: Include = None,
+    exclude: Exclude = None,
+    crs: Crs = None,
+    north: North = None,
+    no_pose: NoPose = False,
+    survey_format: Format = None,
+    mapping: Mapping = None,
+    max_gap: MaxGap = 1.0,
+    whole_panoramas: WholePanoramas = False,
+    no_track_headings: NoTrackHeadings = False,
+    allow_ballpark: AllowBallpark = False,
+    stored_rotation: StoredRotation = False,
+    no_masks: NoMasks = False,
+) -> "ReadOptions":
+    """How a survey is read that is to be indexed."""
+    from survey import ReadOptions
+
+    return ReadOptions(
+        crs=crs,
+        north=north,
+        no_pose=no_pose,
+        include=tuple(include or ()),
+        exclude=tuple(exclude or ()),
+        format=survey_format,
+        make_upright=not stored_rotation,
+        use_masks=not no_masks,
+        mapping=mapping,
+        max_gap_s=max_gap,
+        cut_panoramas=not whole_panoramas,
+        derive_headings=not no_track_headings,
+        allow_ballpark=allow_ballpark,
+    )
+
+
+def reads_a_survey(command: Callable[..., int]) -> Callable[..., int]:
+    """Give a verb the options of `reading_options` in the place of its parameter `reading`.
+
+    typer knows a verb's options by the signature of its function, and has no groups of them.
+    """
+    own, shared = signature(command).parameters, signature(reading_options).parameters
+    parameters = [
+        option
+        for name, parameter in own.items()
+        for option in (shared.values() if name == "reading" else (parameter,))
+    ]
+
+    @wraps(command)
+    def run(**given: object) -> int:
+        asked: dict[str, Any] = {name: given.pop(name) for name in shared}
+        return command(**given, reading=reading_options(**asked))
+
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    return run
+
+
+def survey_name(name: str, refused: str) -> str:
+    """The name of a survey, as its uris begin with it; '': of the main one.
+
+    Raises
+    ------
+    BadConfig : `refused`, as no folder is called so; or it means the survey without a name.
+    """
+    if "/" in name or name in {".", ".."}:
+        raise BadConfig(refused)
+    if name == "main":
+        raise BadConfig(
+            "A survey cannot be named main: so the survey without a name is called. Choose "
+            "another name; to add images to the main survey, leave --name away."
+        )
+    return unicodedata.normalize("NFC", name)

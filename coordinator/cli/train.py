@@ -53,7 +53,7 @@ def command(
     from coordinator.export.files import write_whole
     from coordinator.querying import Rules, rehearse_queries
     from coordinator.training import train_model
-    from coordinator.truth import read_truth
+    from coordinator.truth import truth_of_index
     from index.models import model_path, write_model
     from index.opened import OpenedIndex
     from workers.stages.choose import KS
@@ -63,8 +63,7 @@ def command(
     opened = OpenedIndex(index.absolute())
     search = fitted_search(search, vote, opened.config.features)
     out = None if out is None else result_file(out, (truth,))
-    catalogue = opened.catalogue
-    queries = read_truth(truth, root, catalogue.column("uri"), catalogue.column("path"))
+    queries = truth_of_index(opened, truth, root)
     check_comparable(opened, queries)
     if out is None:
         model_path(opened.root).parent.mkdir(exist_ok=True)  # or fail before the work

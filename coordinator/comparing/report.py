@@ -9,6 +9,7 @@ import numpy as np
 
 from contracts.config import SearchConfig
 from contracts.errors import WrongInput
+from contracts.progress import Progress
 from coordinator.comparing import paper
 from coordinator.comparing.choices import choices_of
 from coordinator.comparing.results import Results, results_of
@@ -18,7 +19,6 @@ from coordinator.export.figures import draw_intervals, draw_shares
 from coordinator.export.files import write_whole
 from coordinator.export.tables import write_tables
 from coordinator.follow import Follower
-from coordinator.indexing import Progress
 from coordinator.querying import Rules, rehearse_queries
 from coordinator.training import places_of
 from coordinator.truth import JudgedQuery

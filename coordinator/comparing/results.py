@@ -1,6 +1,6 @@
 """How every way of searching answered every query, as arrays."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
@@ -14,6 +14,7 @@ from coordinator.querying import votes_file
 from coordinator.training import own_images, places_of, trials_of
 from coordinator.truth import JudgedQuery
 from index.opened import OpenedIndex
+from index.selecting import candidates
 from index.votes import read_outcomes, read_votes
 from retrieval.evaluation import judge_scores
 from retrieval.fusion import Scores
@@ -122,21 +123,26 @@ def _query_adaptive(
     """AP of query-adaptive late fusion; its reference curves come from queries of other places."""
     detectors = index.config.features.detectors
     sizes = sizes_of(index, detectors, search)
+    among = candidates(index, search.where)
+    known = [[among.places(each[kind]) for kind in ("relevant", "junk")] for each in answers]
     ks = tuple(sorted({k for _, k in trials.candidates}))
     found: dict[int, list[float]] = {k: [] for k in ks}
     for k in ks:
         # Votes are read twice: those of all queries at once may be more than the memory.
         curves = [
-            [_wrong_curve(scores, answer) for scores in _alone(file, detectors, sizes, k)]
-            for file, answer in zip(files, answers, strict=True)
+            [
+                _wrong_curve(scores, {*relevant, *junk})
+                for scores in _alone(file, detectors, sizes, k)
+            ]
+            for file, (relevant, junk) in zip(files, known, strict=True)
         ]
-        for number, (file, answer) in enumerate(zip(files, answers, strict=True)):
+        for number, (file, (relevant, junk)) in enumerate(zip(files, known, strict=True)):
             others = np.flatnonzero(trials.places != trials.places[number]).tolist()
             references = [
                 _reference([curves[other][at] for other in others]) for at in range(len(detectors))
             ]
             fused = query_adaptive(_alone(file, detectors, sizes, k), references)
-            found[k].append(judge_scores(fused, answer["relevant"], answer["junk"]).ap)
+            found[k].append(judge_scores(fused, relevant, junk).ap)
     return {k: np.array(values) for k, values in found.items()}
 
 
@@ -146,9 +152,8 @@ def _reference(curves: Sequence[NDArray[np.float64]]) -> Reference:
     return Reference(np.concatenate(curves) if sum(map(len, curves)) else flat)
 
 
-def _wrong_curve(scores: Scores, answer: Json) -> NDArray[np.float64]:
-    """The score curve of what is known to be wrong, (1, n_curve); none if nothing else is there."""
-    known = {*answer["relevant"], *answer["junk"]}
+def _wrong_curve(scores: Scores, known: Collection[int]) -> NDArray[np.float64]:
+    """The score curve of all but the known, so of wrong answers, (1, n_curve); none without any."""
     if not np.delete(scores.touched, sorted(known)).any():
         return np.empty((0, N_CURVE))
     return reference_curves([scores], [known]).curves

@@ -9,12 +9,14 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from contracts.config import Where
 from contracts.errors import WrongInput
 from coordinator.export.attribution import attributions
 from coordinator.export.stac import JSON_TYPE, STAC_VERSION, ItemMaker, Json
 from geo.bounds import Bounds
 from index.manifest import Generation
 from index.opened import OpenedIndex
+from index.selecting import candidates
 from workers.stages.spots import ground_of
 
 GROUP = 1000
@@ -23,7 +25,7 @@ WHOLE_EARTH = [-180.0, -90.0, 180.0, 90.0]
 
 
 def write_stac(index: OpenedIndex, folder: Path, advance: Callable[[], None]) -> None:
-    """Write every image of an index as a STAC item; the folder is there whole or not at all.
+    """Write every live image of an index as a STAC item; the folder is there whole or not at all.
 
     Parameters
     ----------
@@ -58,10 +60,11 @@ def _write_into(folder: Path, index: OpenedIndex, advance: Callable[[], None]) -
     collection_id = f"flaneur-{generation.digest()}"
     maker = ItemMaker(collection_id, generation.crs, ground_of(index), generation.created_at)
     extent, groups = _Extent(), []
-    for begin in range(0, len(index.catalogue), GROUP):
+    live = candidates(index, Where()).ids
+    for begin in range(0, len(live), GROUP):
         name = f"{begin // GROUP:04d}"
         (folder / name).mkdir()
-        rows = index.catalogue.rows(range(begin, min(begin + GROUP, len(index.catalogue))))
+        rows = index.catalogue.rows(live[begin : begin + GROUP])
         names = []
         for item in maker.items(rows):
             _write(folder / name / f"{item['id']}.json", item)
@@ -106,7 +109,7 @@ def _collection(
         "stac_version": STAC_VERSION,
         "id": collection_id,
         "title": surveys or collection_id,
-        "description": f"{generation.n_images} street-level images indexed by Flaneur, "
+        "description": f"{generation.n_live} street-level images indexed by Flaneur, "
         f"generation {generation.number}.",
         "license": "other",
         "extent": extent.described(),

@@ -1,9 +1,10 @@
 """Ground truth: which images of the index show a query's place, in any of three formats."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from contracts.config import Where
 from contracts.errors import BadTruth
 from coordinator.truth.holidays import is_holidays, read_holidays
 from coordinator.truth.names import Names
@@ -11,8 +12,10 @@ from coordinator.truth.oxford import read_oxford
 from coordinator.truth.photos import Photos
 from coordinator.truth.references import read_references
 from coordinator.truth.written import Box, WrittenQuery, decoded_text
+from index.opened import OpenedIndex
+from index.selecting import candidates
 
-__all__ = ["JudgedQuery", "read_truth"]
+__all__ = ["JudgedQuery", "read_truth", "truth_of_index"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,21 @@ def read_truth(
     return [
         JudgedQuery(each.query, folder / each.photo, names.image_ids(each.query, each.relevant))
         for each in read_references(path, content)
+    ]
+
+
+def truth_of_index(index: OpenedIndex, path: Path, root: Path | None) -> list[JudgedQuery]:
+    """`read_truth` of the images that an index has now; removed ones are as if never indexed."""
+    live = candidates(index, Where()).ids.tolist()
+    uris, paths = (index.catalogue.column(name) for name in ("uri", "path"))
+    queries = read_truth(path, root, [uris[n] for n in live], [paths[n] for n in live])
+    return [
+        replace(
+            query,
+            relevant=tuple(live[n] for n in query.relevant),
+            junk=tuple(live[n] for n in query.junk),
+        )
+        for query in queries
     ]
 
 

@@ -6,38 +6,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import made_places
+import numpy as np
+
 from contracts.config import IndexConfig
 from coordinator.export.stac import ItemMaker
 from geo.crs import ToWgs84, area_of
 from index.catalogue import CatalogueRow, write_catalogue
-from index.manifest import FileEntry, Generation, SurveyEntry, commit
+from index.commits import writing
+from index.files import write_array
+from index.manifest import FileEntry, Generation, SegmentEntry, SurveyEntry
 from index.opened import OpenedIndex
+from index.segments import segment_paths
 from workers.stages.spots import Ground
 
 INDEXED_AT = "2024-02-29T12:00:00+00:00"
-ROW = CatalogueRow(
-    image_id=0,
-    uri="run1/été.jpg",
-    path="/survey/run1/été.jpg",
-    fragment="",
-    survey="",
-    sha256="0" * 64,
-    easting=652000.0,
-    northing=6862000.0,
-    altitude_m=40.0,
-    heading_deg=90.0,
-    heading_derived=False,
-    north="grid",
-    pitch_deg=-5.0,
-    roll_deg=1.0,
-    position_error_m=None,
-    camera="front",
-    hfov_deg=60.0,
-    width_px=1920,
-    height_px=1080,
-    captured_at="2014-06-16T10:00:00+02:00",
-    quarter_turns=0,
-)
+ROW = replace(made_places.ROW, uri="run1/été.jpg", path="/survey/run1/été.jpg")
 
 
 def numbered(row: CatalogueRow, count: int) -> list[CatalogueRow]:
@@ -48,27 +32,43 @@ def numbered(row: CatalogueRow, count: int) -> list[CatalogueRow]:
 
 
 def index_of(root: Path, rows: Sequence[CatalogueRow], crs: str | None) -> OpenedIndex:
-    name = "catalogue/0001.parquet"
-    digest = write_catalogue(root / name, rows, crs)
+    config = IndexConfig()
+    catalogue = root / "catalogue" / "0001.parquet"
+    norms = segment_paths(root, "0001", config.features.channels()[0]).words_per_image
+    digests = {
+        catalogue: write_catalogue(catalogue, rows, crs),
+        norms: write_array(norms, np.zeros(len(rows), dtype=np.uint32)),
+    }
     survey = SurveyEntry(
         name="", path="/survey", format="table", n_images=len(rows), attribution="© A survey"
     )
+    segment = SegmentEntry(
+        name="0001",
+        jobs=("0" * 16,),
+        n_images=len(rows),
+        n_postings=0,
+        n_skipped=0,
+        surveys=(survey,),
+        quantisation={},
+    )
     generation = Generation(
         number=1,
-        job="0" * 16,
+        made_by="index",
         created_at=INDEXED_AT,
-        config=IndexConfig(),
+        config=config,
         config_digest="",
         crs=crs,
         area=None if crs is None else _area(rows, crs),
-        n_images=len(rows),
-        n_skipped=0,
-        n_postings=0,
-        surveys=(survey,),
-        segment="0001",
-        files={name: FileEntry(sha256=digest, size=(root / name).stat().st_size)},
+        codebooks="0001",
+        codebooks_digest="0" * 16,
+        segments=(segment,),
+        files={
+            path.relative_to(root).as_posix(): FileEntry(sha256=digest, size=path.stat().st_size)
+            for path, digest in digests.items()
+        },
     )
-    commit(root, generation)
+    with writing(root) as writer:
+        writer.commit(generation)
     return OpenedIndex(root)
 
 

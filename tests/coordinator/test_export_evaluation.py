@@ -25,7 +25,8 @@ from coordinator.evaluating import MAX_SHEETS, report_of, write_sheets
 from coordinator.export.evaluation import JudgedSheet, write_evaluation_page
 from coordinator.export.sheets import BOX_RGB, SheetMatch, thumbnail_jpeg
 from coordinator.indexing import run_job
-from coordinator.plan import make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import make_plan
 from coordinator.querying import judge_queries
 from coordinator.truth import JudgedQuery, read_truth
 from index.opened import OpenedIndex

@@ -77,7 +77,7 @@ def test_a_folder_without_leave_to_write_is_refused(index: OpenedIndex, tmp_path
 FULL_DISK = """
 import resource, sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = [sys.argv[1], str(Path(sys.argv[1]).parent)]
 from made_results import made_match
 from contracts.errors import WrongInput
 from coordinator.export.geopackage import write_geopackage

@@ -20,7 +20,8 @@ from coordinator.engine import Engine
 from coordinator.export.inspection import CHOSEN_RGB, picture
 from coordinator.indexing import run_job
 from coordinator.inspecting import Inspection, NoIndex, Seen, coverage
-from coordinator.plan import make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import make_plan
 from index.models import read_model, write_model
 from index.opened import OpenedIndex
 from survey import DecodedImage, ReadOptions

@@ -19,9 +19,10 @@ def test_results_name_whose_images_they_show(tmp_path: Path) -> None:
 
 def test_each_survey_is_named_once_and_one_that_says_nothing_not_at_all(tmp_path: Path) -> None:
     generation = index_of(tmp_path, [ROW], "EPSG:2154").generation
-    (entry,) = generation.surveys
+    (segment,), (entry,) = generation.segments, generation.surveys
     said = [entry.model_copy(update={"attribution": text}) for text in ("B", "", "© A survey", "B")]
-    assert attributions(generation.model_copy(update={"surveys": tuple(said)})) == [
+    told = segment.model_copy(update={"surveys": tuple(said)})
+    assert attributions(generation.model_copy(update={"segments": (told,)})) == [
         "B",
         "© A survey",
     ]

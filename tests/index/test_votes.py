@@ -1,5 +1,6 @@
 """What was rehearsed of a query comes back from disk as it was written, or not at all."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +83,8 @@ def test_a_changed_byte_is_noticed(written: Path) -> None:
 def test_what_is_no_archive_is_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "one.npy", np.zeros(3))
     (tmp_path / "text").write_text("hesaff")
-    for name in ("one.npy", "text"):
+    os.mkfifo(tmp_path / "pipe")  # which nobody writes to
+    for name in ("one.npy", "text", "pipe"):
         with pytest.raises(BadIndex, match="does not hold the votes"):
             read_votes(tmp_path / name, NAMES, (2,))
 

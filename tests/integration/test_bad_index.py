@@ -23,7 +23,8 @@ from coordinator.cli import main
 from coordinator.cli.show import Bars
 from coordinator.engine import Engine
 from coordinator.indexing import run_job
-from coordinator.plan import make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import make_plan
 from coordinator.querying import locate_photos
 from index.opened import OpenedIndex
 from survey import ReadOptions
@@ -70,9 +71,9 @@ def overwrite(path: Path, start: int, content: bytes) -> None:
 @pytest.mark.parametrize(
     ("file", "content", "says"),
     [
-        ("segments/0001/hesaff-sift/image_ids.npy", b"short", "image_ids.npy is missing or not"),
-        ("codebooks/0001/hesaff-sift.npy", None, "hesaff-sift.npy is missing or not"),
-        ("CURRENT", b"000042\n", "000042.json cannot be read"),
+        ("segments/0001/hesaff-sift/packed.npy", b"short", "packed.npy is 5 bytes long, expected"),
+        ("codebooks/0001/hesaff-sift.npy", None, "hesaff-sift.npy is missing, expected a file of"),
+        ("CURRENT", b"000042\n", "has no generation 42; there are: 1"),
         ("CURRENT", b"../../elsewhere\n", "expected the number of a generation"),
         ("CURRENT", None, "is not finished"),
         ("generations/000001.json", b"{}", "000001.json"),
@@ -102,12 +103,13 @@ def test_what_is_no_index_is_refused(tmp_path: Path, small_survey: Path, place: 
 
 
 DAMAGE = [
-    ("codebooks/0001/hesaff-sift.faiss", 1000, b"\xfe\xfd\xfc", "not the file that was written"),
+    ("codebooks/0001/hesaff-sift.npz", 300, b"\xfe\xfd\xfc", "not the file that was written"),
     ("codebooks/0001/hesaff-sift.json", 0, b"AAAA", "hesaff-sift.json is damaged"),
-    ("segments/0001/hesaff-sift/indptr.npy", 160, b"\xff" * 8, "ascend"),
-    ("segments/0001/hesaff-sift/indptr.npy", 160, b"\xff" * 7 + b"\x7f", "ascend"),
-    ("segments/0001/hesaff-sift/image_ids.npy", 128, b"\xff" * 400, "beyond the catalogue"),
-    ("segments/0001/hesaff-sift/image_ids.npy", 0, b"AAAAAAAA", "cannot be read as an array"),
+    ("segments/0001/hesaff-sift/offsets.npy", 160, b"\xff" * 800, "are damaged"),
+    ("segments/0001/hesaff-sift/offsets.npy", 160, (b"\xff" * 7 + b"\x7f") * 100, "are damaged"),
+    ("segments/0001/hesaff-sift/counts.npy", 128, b"\xff" * 800, "are damaged"),
+    ("segments/0001/hesaff-sift/packed.npy", 128, b"\xff" * 400, "are damaged"),
+    ("segments/0001/hesaff-sift/packed.npy", 0, b"AAAAAAAA", "cannot be read as an array"),
     ("catalogue/0001.parquet", 4, b"\xff" * 2000, "cannot be read as a catalogue"),
 ]
 
@@ -146,7 +148,7 @@ def test_damage_that_a_worker_finds_is_wrong_input_too(
 
 @pytest.mark.parametrize(
     ("change", "says"),
-    [({"segment": "../../elsewhere"}, "names the segment"), ({"n_shards": "many"}, "is damaged")],
+    [({"segment": "../../elsewhere"}, "is damaged"), ({"n_shards": "many"}, "is damaged")],
 )
 def test_an_edited_plan_is_refused(
     damaged: Path, small_survey: Path, change: dict[str, object], says: str

@@ -129,6 +129,7 @@ def test_bad_photos_stop_no_other(mixed: tuple[Path, int, dict[str, Any]], tmp_p
         ((*SMALL, "--also", "nowhere"), "NAME=SURVEY"),
         ((*SMALL, "--also", "a/b=."), "NAME=SURVEY"),
         ((*SMALL, "--also", "a=.", "--also", "a=."), "its own name"),
+        ((*SMALL, "--also", "main=."), "cannot be named main"),
         ((*SMALL, "--also", "a=/nowhere"), "/nowhere does not exist"),
         ((*SMALL, "--include", "*.gif"), "--include"),
         ((*SMALL, "--max-words", "0"), "max_words"),

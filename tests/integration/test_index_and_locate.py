@@ -17,7 +17,8 @@ from coordinator import querying
 from coordinator.cli.show import Bars
 from coordinator.engine import Engine, running_engine
 from coordinator.indexing import IndexReport, run_job
-from coordinator.plan import make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import make_plan
 from coordinator.querying import locate_photos
 from index.opened import OpenedIndex
 from survey import ReadOptions
@@ -272,6 +273,29 @@ def test_several_outputs_and_stdout_say_the_same(
     assert kinds[0] == "match"
     assert len(pyogrio.read_dataframe(third, layer="matches")) == kinds.count("match")
     assert kinds[-1] == "error"
+
+
+def test_only_images_that_are_meant_are_searched_and_results_say_which(
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path, engine: Engine
+) -> None:
+    asked = ("locate", small_survey / "04.jpg", "--index", indexed[0])
+    asked += ("--broker", engine.app.conf.broker_url)
+    region = tmp_path / "region.geojson"
+    ring = [[652002, 6861990], [652030, 6861990], [652030, 6862010], [652002, 6861990]]
+    ring.insert(3, [652002, 6862010])
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::2154"}}
+    region.write_text(json.dumps({"type": "Polygon", "coordinates": [ring], "crs": crs}))
+    conditions = ("--within", region, "--heading", "90±5", "--since", "2020-05", "--until", "2020")
+    told = run(*asked, *conditions, "--uri", "0[5-9].jpg", "--survey", "main")
+    assert told.returncode == 0, told.stderr
+    results = json.loads(told.stdout)
+    found = {each["properties"].get("image") for each in results["features"]}
+    assert found - {None} == {"05.jpg", "06.jpg", "07.jpg"}
+    about = results["flaneur"]["searched"]
+    assert (about["images"], about["heading"], about["surveys"]) == (3, [90.0, 5.0], [""])
+    none = run(*asked, *conditions, "--bbox", "10,50,11,51")
+    assert none.returncode == 2
+    assert "--bbox 10,50,11,51 leaves 0 of 10 images; --within leaves 7 of 10" in none.stderr
 
 
 def test_ctrl_c_keeps_the_answers_so_far_beside_and_nothing_under_the_name(

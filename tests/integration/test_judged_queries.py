@@ -1,6 +1,9 @@
 """From a ground truth on disk to judged rankings, through real workers."""
 
+import json
+import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -8,10 +11,21 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from contracts.config import CodebookConfig, Detector, FeatureConfig, IndexConfig, SearchConfig
+from contracts.config import (
+    CodebookConfig,
+    Detector,
+    FeatureConfig,
+    IndexConfig,
+    SearchConfig,
+    Where,
+)
+from contracts.errors import BadTruth
+from coordinator.cli.show import Bars
 from coordinator.engine import Engine
+from coordinator.export.stac_folder import write_stac
 from coordinator.querying import Json, Rules, judge_queries, rehearse_queries, votes_file
-from coordinator.truth import read_truth
+from coordinator.removing import remove_images
+from coordinator.truth import read_truth, truth_of_index
 from index.opened import OpenedIndex
 from index.votes import read_outcomes, read_votes
 from retrieval.ways import Way
@@ -117,7 +131,8 @@ def test_a_copy_of_an_indexed_image_does_not_find_itself(
 
 def test_images_are_found_by_the_digest_of_their_file(opened: OpenedIndex) -> None:
     digests = opened.catalogue.column("sha256")
-    assert opened.images_by_sha256 == {digest: (n,) for n, digest in enumerate(digests)}
+    assert [opened.images_of_file(digest) for digest in digests] == [(n,) for n in range(10)]
+    assert opened.images_of_file("f" * 64) == ()
 
 
 def test_rehearsing_answers_every_way_as_a_search_of_its_own_does(
@@ -164,3 +179,52 @@ def test_rehearsing_for_training_leaves_nothing_on_disk(
     (alone,) = judge_queries(opened, queries, SEARCH, engine.follower, lambda: None)
     assert answer["together"] == [[pytest.approx(alone["ap"])]]
     assert sorted(opened.root.rglob("*")) == before
+
+
+@pytest.fixture(scope="module")
+def without_05(opened: OpenedIndex, tmp_path_factory: pytest.TempPathFactory) -> OpenedIndex:
+    """The same index after image 05 was removed."""
+    root = tmp_path_factory.mktemp("removed") / "index"
+    shutil.copytree(opened.root, root)
+    remove_images(root, Where(), ["05.jpg"], [], Bars(None))
+    return OpenedIndex(root)
+
+
+def test_a_removed_image_is_in_no_truth(tmp_path: Path, without_05: OpenedIndex) -> None:
+    truth = tmp_path / "truth.json"
+    truth.write_text('{"part.png": ["05.jpg"]}')
+    with pytest.raises(BadTruth, match=r"names 05\.jpg, which is no image of the index"):
+        truth_of_index(without_05, truth, None)
+    assert without_05.images_of_file(without_05.catalogue.column("sha256")[5]) == ()
+
+
+def test_a_removed_image_is_no_item_of_an_export(tmp_path: Path, without_05: OpenedIndex) -> None:
+    write_stac(without_05, tmp_path / "stac", lambda: None)
+    items = [json.loads(path.read_bytes()) for path in (tmp_path / "stac").glob("*/*.json")]
+    titles = [each["properties"]["title"] for each in items if each["type"] == "Feature"]
+    assert sorted(titles) == [f"{name}.jpg" for name in ALL if name != "05"]
+
+
+def test_a_removed_image_is_in_no_ranking_and_the_others_keep_their_ids(
+    tmp_path: Path, small_survey: Path, without_05: OpenedIndex, engine: Engine
+) -> None:
+    photo = np.asarray(Image.open(small_survey / "05.jpg"))
+    Image.fromarray(photo[:150, :200]).save(tmp_path / "part.png")
+    truth = tmp_path / "truth.json"
+    others = [f"{name}.jpg" for name in ALL if name != "05"]
+    truth.write_text(json.dumps({"part.png": others}))
+    (query,) = truth_of_index(without_05, truth, None)
+    assert query.relevant == (0, 1, 2, 3, 4, 6, 7, 8, 9)
+    (judged,) = judge_queries(without_05, [query], SEARCH, engine.follower, lambda: None)
+    assert sorted(each["image_id"] for each in judged["top"]) == list(query.relevant)
+    assert judged["ap"] == pytest.approx(1.0)
+    ranked = [each["image_id"] for each in judged["top"]]
+    last = replace(query, relevant=(ranked[-1],), junk=(ranked[0], ranked[4]))
+    for each in (query, last):
+        (alone,) = judge_queries(without_05, [each], SEARCH, engine.follower, lambda: None)
+        (answer,) = rehearse_queries(
+            without_05, [each], SEARCH, Rules.of(SEARCH), [2], engine.follower, lambda: None
+        )
+        assert answer["together"] == [[pytest.approx(alone["ap"])]]
+        assert alone["first_hit_rank"] == (1 if each is query else 7)
+        assert (answer["relevant"], answer["junk"]) == ([*each.relevant], sorted(each.junk))

@@ -14,7 +14,8 @@ from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchC
 from coordinator.cli.show import Bars
 from coordinator.engine import Engine
 from coordinator.indexing import run_job
-from coordinator.plan import make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import make_plan
 from coordinator.querying import locate_photos
 from index.opened import OpenedIndex
 from survey import ReadOptions, decode_image, read_survey

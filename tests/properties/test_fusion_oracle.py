@@ -3,23 +3,20 @@
 import heapq
 import math
 from collections import defaultdict
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from contracts.config import MAX_NEIGHBOURS, SearchConfig
 from retrieval.codebooks import Codebook
 from retrieval.fusion import ChannelQuery, Scores, full_ranking, fuse, rank
-from retrieval.postings import build_postings, document_frequency, inverse_document_frequency
+from retrieval.postings import build_postings, inverse_document_frequency
 
 N_IMAGES = 9
 DISTINCT = np.arange(1, N_IMAGES + 1)
 Detectors = list[list[ChannelQuery]]
-Removed = NDArray[np.bool_]
 Word = tuple[float, float, list[int]]  # d', idf, images
 Cell = tuple[float, list[tuple[int, float]]]  # distance, occurrences (image, squared idf)
 
@@ -45,12 +42,13 @@ def some_channel(rng: np.random.Generator, n_points: int, k: int, scale: str) ->
         dmin,
         codebook.farthest(k, "percentile" if scale == "percentile" else "range"),
         postings,
+        inverse_document_frequency(np.diff(postings.indptr), N_IMAGES),
     )
 
 
 @st.composite
-def searches(draw: st.DrawFn) -> tuple[Detectors, SearchConfig, Removed]:
-    """Detectors, a configuration that suits them, and which images are removed."""
+def searches(draw: st.DrawFn) -> tuple[Detectors, SearchConfig]:
+    """Detectors, and a configuration that suits them."""
     n_channels, k = draw(st.integers(1, 3)), draw(st.sampled_from([1, 2, 2, 3, 4, 5, 10]))
     most_points = 4 if k < 10 else 1
     points = draw(st.lists(st.integers(0, most_points), min_size=1, max_size=4))
@@ -64,24 +62,17 @@ def searches(draw: st.DrawFn) -> tuple[Detectors, SearchConfig, Removed]:
         union = {"max_images": draw(limits), "union_distance": distance}
     config = SearchConfig.of(vote=vote, weights=weights, distance_scale=scale, **union)
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    removed = rng.random(N_IMAGES) < draw(st.sampled_from([0.0, 0.4]))
-    detectors = [[some_channel(rng, n, k, scale) for _ in range(n_channels)] for n in points]
-    return [[with_idf(one, removed) for one in channels] for channels in detectors], config, removed
+    return [[some_channel(rng, n, k, scale) for _ in range(n_channels)] for n in points], config
 
 
-def with_idf(channel: ChannelQuery, removed: Removed) -> ChannelQuery:
-    df = document_frequency(channel.postings, removed)
-    return replace(channel, idf=inverse_document_frequency(df, int((~removed).sum())))
-
-
-def words_of(channel: ChannelQuery, point: int, removed: Removed, use_idf: bool) -> list[Word]:
+def words_of(channel: ChannelQuery, point: int, use_idf: bool) -> list[Word]:
     """A keypoint's words, nearest first: each image with its nearest word, no empty word."""
     found: set[int] = set()
     words = []
     for word, sq_dist in zip(channel.word_ids[point], channel.sq_dist[point], strict=True):
         start, stop = channel.postings.indptr[word : word + 2]
         listed = [int(image) for image in channel.postings.image_ids[start:stop]]
-        images = [image for image in listed if not removed[image] and image not in found]
+        images = [image for image in listed if image not in found]
         found.update(images)
         above, span = float(sq_dist) - channel.dmin, channel.dmax - channel.dmin
         distance = min(max(above / span, 0.0), 1.0) if span > 0 else float(above > 0)
@@ -142,13 +133,13 @@ def multiplied(lists: list[list[Word]], vote: str) -> dict[int, float]:
     return votes
 
 
-def oracle(detectors: Detectors, config: SearchConfig, removed: Removed) -> dict[int, float]:
+def oracle(detectors: Detectors, config: SearchConfig) -> dict[int, float]:
     scores: dict[int, float] = defaultdict(float)
     for channels in detectors:
         score: dict[int, float] = defaultdict(float)
         voters: dict[int, int] = defaultdict(int)
         for point in range(len(channels[0].word_ids)):
-            lists = [words_of(one, point, removed, "idf" in config.weights) for one in channels]
+            lists = [words_of(one, point, "idf" in config.weights) for one in channels]
             if not all(lists):
                 continue
             if config.vote == "union":
@@ -175,11 +166,11 @@ def assert_equal(got: Scores, expected: dict[int, float]) -> None:
 @settings(max_examples=2500, deadline=None)
 @given(searches())
 def test_fusion_equals_the_literal_walk(
-    search: tuple[Detectors, SearchConfig, Removed],
+    search: tuple[Detectors, SearchConfig],
 ) -> None:
-    detectors, config, removed = search
-    scores = fuse(detectors, N_IMAGES, config, DISTINCT, removed)
-    assert_equal(scores, oracle(detectors, config, removed))
+    detectors, config = search
+    scores = fuse(detectors, N_IMAGES, config, DISTINCT)
+    assert_equal(scores, oracle(detectors, config))
 
     matches = rank(scores, None)
     by_hand = sorted(np.flatnonzero(scores.touched), key=lambda i: (-scores.values[i], i))
@@ -190,36 +181,15 @@ def test_fusion_equals_the_literal_walk(
     assert full_ranking(scores).tolist() == by_hand + rest
 
 
-@settings(max_examples=500, deadline=None)
-@given(searches())
-def test_a_removed_image_is_as_if_never_indexed(
-    search: tuple[Detectors, SearchConfig, Removed],
-) -> None:
-    detectors, config, removed = search
-    compacted: Detectors = []
-    for channels in detectors:
-        compacted.append([])
-        for one in channels:
-            words = np.repeat(np.arange(one.postings.n_words), np.diff(one.postings.indptr))
-            kept = ~removed[one.postings.image_ids]
-            ids = one.postings.image_ids[kept]
-            postings = build_postings(words[kept].astype(np.int32), ids, one.postings.n_words)
-            compacted[-1].append(replace(one, postings=postings))
-    tombstoned = fuse(detectors, N_IMAGES, config, DISTINCT, removed)
-    rebuilt = fuse(compacted, N_IMAGES, config, DISTINCT)
-    assert tombstoned.values.tolist() == rebuilt.values.tolist()
-    assert tombstoned.touched.tolist() == rebuilt.touched.tolist()
-
-
 @settings(max_examples=300, deadline=None)
 @given(searches())
 def test_a_walk_that_never_reaches_t_equals_the_closed_form(
-    search: tuple[Detectors, SearchConfig, Removed],
+    search: tuple[Detectors, SearchConfig],
 ) -> None:
-    detectors, config, removed = search
+    detectors, config = search
     settings = {"vote": "union", "weights": config.weights, "union_distance": config.union_distance}
     closed, walk = (
-        fuse(detectors, N_IMAGES, SearchConfig.of(max_images=t, **settings), DISTINCT, removed)
+        fuse(detectors, N_IMAGES, SearchConfig.of(max_images=t, **settings), DISTINCT)
         for t in (None, N_IMAGES + 1)
     )
     assert walk.touched.tolist() == closed.touched.tolist()
@@ -229,10 +199,10 @@ def test_a_walk_that_never_reaches_t_equals_the_closed_form(
 @settings(max_examples=300, deadline=None)
 @given(searches())
 def test_detectors_are_independent_of_each_other(
-    search: tuple[Detectors, SearchConfig, Removed],
+    search: tuple[Detectors, SearchConfig],
 ) -> None:
-    detectors, config, removed = search
-    together = fuse(detectors, N_IMAGES, config, DISTINCT, removed)
-    alone = [fuse([one], N_IMAGES, config, DISTINCT, removed) for one in detectors]
+    detectors, config = search
+    together = fuse(detectors, N_IMAGES, config, DISTINCT)
+    alone = [fuse([one], N_IMAGES, config, DISTINCT) for one in detectors]
     assert together.values == pytest.approx(sum(one.values for one in alone), rel=1e-9, abs=1e-9)
     assert together.touched.tolist() == np.any([one.touched for one in alone], axis=0).tolist()

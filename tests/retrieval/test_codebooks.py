@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import replace
+from itertools import pairwise
 
 import faiss
 import numpy as np
@@ -11,8 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from contracts.config import MAX_NEIGHBOURS, CodebookConfig
-from contracts.errors import VocabularyMismatch, WrongInput
-from retrieval import clustering, word_search
+from contracts.errors import BadIndex, VocabularyMismatch, WrongInput
+from retrieval import clustering
 from retrieval.clustering import flat_kmeans, share_out, two_level_kmeans
 from retrieval.codebooks import (
     Codebook,
@@ -20,6 +21,7 @@ from retrieval.codebooks import (
     WordSearcher,
     build_search,
     n_words_for,
+    outgrown,
     sample_keys,
     train_codebook,
 )
@@ -229,18 +231,6 @@ def test_ties_reaching_far_beyond_what_was_asked_still_go_to_the_smallest_word()
     assert word_ids.tolist() == [[200, 201]] * 30
 
 
-@pytest.mark.parametrize("k", [1, 2, 5])
-def test_ties_are_settled_even_if_the_search_prefers_the_largest_word(k: int) -> None:
-    distances = np.array([[7] * 60 + [9], [9] + [7] * 60, [5, 5] + [8] * 59])
-    keys = distances.astype(np.int64) << 32 | np.arange(61)
-
-    def contrary(rows: NDArray[np.int64], asked: int) -> NDArray[np.int64]:
-        order = np.lexsort((-np.arange(61) * np.ones((len(rows), 1)), distances[rows]))
-        return np.sort(np.take_along_axis(keys[rows], order[:, :asked], axis=1), axis=1)
-
-    assert word_search._settled(contrary, 3, k, 61).tolist() == np.sort(keys)[:, :k].tolist()
-
-
 def test_the_largest_distances_stay_exact() -> None:
     words = np.array([[0] * 128, [255] * 127 + [254]], np.uint8)
     _, sq_dist = searcher(words).nearest(np.full((40, 128), 255, np.uint8), 2)
@@ -254,7 +244,7 @@ def large() -> WordSearcher:
 
 
 def test_a_large_codebook_finds_nearly_all_nearest_words(large: WordSearcher) -> None:
-    points = descriptors(300, seed=5)
+    points = descriptors(60, seed=5)
     expected, _ = by_hand(points, large.codebook.words, 1)
     word_ids, _ = large.nearest(points, 1)
     assert (word_ids == expected).mean() >= 0.95
@@ -277,11 +267,15 @@ def test_every_word_is_found_even_where_lists_are_short(large: WordSearcher) -> 
     assert np.sort(word_ids, axis=1).tolist() == [list(range(n_words))] * 2
 
 
-def test_a_stored_structure_finds_the_same_words(large: WordSearcher) -> None:
-    structure = faiss.serialize_index(build_search(large.codebook.words))
-    reopened = WordSearcher(large.codebook, faiss.deserialize_index(structure))
+def test_the_lists_of_words_do_not_depend_on_the_order_of_the_words(large: WordSearcher) -> None:
+    words = large.codebook.words
+    order = np.random.default_rng(0).permutation(len(words))
     points = descriptors(100, seed=8)
-    assert reopened.nearest(points, 2)[0].tolist() == large.nearest(points, 2)[0].tolist()
+    ids, sq_dist = large.nearest(points, 2)
+    shuffled_ids, shuffled_distances = searcher(words[order]).nearest(points, 2)
+    assert shuffled_distances.tolist() == sq_dist.tolist()
+    alone = sq_dist[:, 0] < sq_dist[:, 1]
+    assert order[shuffled_ids[alone, 0]].tolist() == ids[alone, 0].tolist()
 
 
 def test_a_structure_of_other_words_or_other_descriptors_is_refused() -> None:
@@ -292,3 +286,66 @@ def test_a_structure_of_other_words_or_other_descriptors_is_refused() -> None:
         WordSearcher(replace(codebook, words=descriptors(10, 64)), build_search(codebook.words))
     with pytest.raises(VocabularyMismatch, match="64"):
         searcher(codebook.words).nearest(descriptors(2, 64), 1)
+    with pytest.raises(WrongInput, match="129 dimensions"):
+        searcher(descriptors(10, 129)).nearest(descriptors(2, 129), 1)
+
+
+@pytest.mark.parametrize("starts", [[0, 11], [1, 10], [0, 11, 10], [0, 5, 10], []])
+def test_lists_that_do_not_hold_the_words_are_refused(starts: list[int]) -> None:
+    codebook = Codebook(descriptors(10), 0.0, FAR, FAR)
+    lists = replace(build_search(codebook.words), starts=np.array(starts, dtype=np.int64))
+    with pytest.raises(VocabularyMismatch, match="build it from these words"):
+        WordSearcher(codebook, lists)
+
+
+@pytest.mark.parametrize("word_id", [-1, 10, 2**31 - 1])
+def test_a_word_that_is_not_there_is_refused(word_id: int) -> None:
+    codebook = Codebook(descriptors(10), 0.0, FAR, FAR)
+    lists = build_search(codebook.words)
+    lists.word_ids[7] = word_id
+    with pytest.raises(BadIndex, match=f"names word {word_id} of 10"):
+        WordSearcher(codebook, lists).nearest(descriptors(3), 1)
+
+
+def test_trained_words_come_list_after_list() -> None:
+    words = train_codebook(descriptors(9_000, 16, top=200), 4_500, seed=0).words
+    lists = build_search(words)
+    assert len(lists.centres) > 100
+    assert lists.word_ids.tolist() == list(range(len(words)))
+
+
+def test_words_of_one_list_are_ascending_and_each_is_in_one(large: WordSearcher) -> None:
+    words = large.codebook.words
+    lists = build_search(words)
+    expected, _ = by_hand(words[::50], lists.centres, 1)
+    of_word = np.empty(len(words), np.int64)
+    for centre, (start, stop) in enumerate(pairwise(lists.starts)):
+        assert np.all(np.diff(lists.word_ids[start:stop]) > 0)
+        of_word[lists.word_ids[start:stop]] = centre
+    assert np.sort(lists.word_ids).tolist() == list(range(len(words)))
+    assert of_word[::50].tolist() == expected[:, 0].tolist()
+
+
+def test_words_are_outgrown_where_descriptors_lie_much_farther_from_them() -> None:
+    before = {"hesaff-sift": 100.0, "star-sc": 100.0, "mser-sc": 0.0, "orb-sc": 5.0}
+    now = {"star-sc": 10_000.0, "hesaff-sift": 99.0, "mser-sc": 7.0, "har-sc": 1e9}
+    assert outgrown(before, now) == ("star-sc",)
+    assert outgrown(before, before) == outgrown({}, now) == ()
+
+
+def test_words_of_few_points_each_are_outgrown_later() -> None:
+    before, now = {"hesaff-sift": 100.0}, {"hesaff-sift": 200.0}
+    assert outgrown(before, now) == ()
+    assert outgrown(before, now, {"hesaff-sift": 50}) == ("hesaff-sift",)
+    assert outgrown(before, {"hesaff-sift": 149.0}, {"hesaff-sift": 1e6}) == ()
+
+
+def test_words_of_some_scenes_are_outgrown_by_others_and_not_by_more_of_the_same() -> None:
+    def mean(points: NDArray[np.uint8]) -> dict[str, float]:
+        return {"hesaff-sc": float(scenes.nearest(points, 1)[1].mean())}
+
+    codebook = train_codebook(descriptors(5_000, seed=1), 100, seed=0)
+    scenes = WordSearcher(codebook, build_search(codebook.words))
+    before, fifty = mean(descriptors(5_000, seed=1)), {"hesaff-sc": 50.0}
+    assert outgrown(before, mean(descriptors(5_000, seed=2)), fifty) == ()
+    assert outgrown(before, mean(descriptors(5_000, seed=3, top=120)), fifty) == ("hesaff-sc",)

@@ -167,8 +167,8 @@ def test_what_cannot_be_fused_is_refused_by_name() -> None:
         fuse([[replace(one, postings=broken)]], 6, PLAIN)
     with pytest.raises(WrongInput, match=r"\[1, 2\] keypoints"):
         fuse([[one, channel([[0]], [[0], [0]], [[0], [0]])]], 6, PLAIN)
-    with pytest.raises(WrongInput, match="removed has 2 entries for 6"):
-        fuse([[one]], 6, PLAIN, removed=np.zeros(2, np.bool_))
+    with pytest.raises(WrongInput, match="distinct_words has 2 entries for 6"):
+        fuse([[one]], 6, PLAIN, np.zeros(2, np.int64))
     with pytest.raises(WrongInput, match="without descriptors"):
         fuse([[]], 6, PLAIN)
     with pytest.raises(BadConfig, match="`idf` needs"):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from contracts.config import SearchConfig, Where
 from contracts.records import Match
 from geo.confidence import DENSITY
 from geo.crs import ToWgs84
@@ -56,7 +57,7 @@ def test_the_first_matches_come_first_and_the_estimate_after_them(
     small_index: OpenedIndex,
 ) -> None:
     scores = scores_of([10.0, 9.0, 8.0, 7.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
-    found = place(small_index, "q.jpg", CHOSEN, rank(scores, 10), 3, scores)
+    found = place(small_index, "q.jpg", CHOSEN, rank(scores, 10), SearchConfig(top=3), scores)
     assert kinds(found) == ["match", "match", "match", "estimate"]
     estimate = found[-1]["properties"]
     assert 0.0 < estimate["radius_m"] <= estimate["radius_95_m"]
@@ -66,7 +67,7 @@ def test_the_first_matches_come_first_and_the_estimate_after_them(
 
 def test_the_estimate_stands_between_the_cameras_that_agree(small_index: OpenedIndex) -> None:
     scores = scores_of([10.0, 10.0, *[0.1] * 8])
-    found = place(small_index, "q.jpg", CHOSEN, rank(scores, 10), 1, scores)
+    found = place(small_index, "q.jpg", CHOSEN, rank(scores, 10), SearchConfig(top=1), scores)
     lon, lat = found[-1]["geometry"]["coordinates"][:2]
     east, north = ToWgs84("EPSG:2154").from_lon_lat([lon], [lat])
     assert 652000.0 <= east[0] <= 652004.1
@@ -163,6 +164,15 @@ def test_the_stated_error_of_positions_widens_the_radii(
     rough = [replace(row, position_error_m=15.0) for row in rows]
     found = found_in(rough, ground)
     assert found.position_error_m == 15.0
+
+
+def test_the_ground_of_a_search_is_that_of_its_candidates(small_index: OpenedIndex) -> None:
+    everywhere = ground_of(small_index)
+    east = ground_of(small_index, Where(uris=("0[89].jpg",)))
+    assert everywhere is not None
+    assert east is not None
+    np.testing.assert_array_equal(east.lon_deg, everywhere.lon_deg[8:])
+    assert ground_of(small_index, Where(since="2021")) is None
 
 
 def facing(

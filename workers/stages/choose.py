@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from contracts.config import DESCRIPTORS, Descriptor, Detector, SearchConfig
 from index.models import read_model
 from index.opened import OpenedIndex
+from index.selecting import candidates
 from retrieval.candidates import Candidate, FirstLook, candidate_features
 from retrieval.choice import Choice, ChoiceModel
 from workers.stages.retrieve import (
@@ -92,7 +93,8 @@ def features_of(
     if model.needs_look:
         words = words_of(index, photo, model.detectors, max(ks), search)
         votes = detector_votes(index, words, ks, search)
-        look = FirstLook(votes, sizes_of(index, model.detectors, search), junk)
+        unseen = candidates(index, search.where).places(junk)
+        look = FirstLook(votes, sizes_of(index, model.detectors, search), unseen)
     return candidate_features(
         photo.complementarity(model.detectors),
         densities(index, model.detectors, search),
@@ -127,6 +129,7 @@ def fitting_model(index: Configured, search: SearchConfig) -> tuple[ChoiceModel 
             "pair": trained.pair,
             "k": trained.k,
             "top": trained.top,
+            "where": trained.where,
         }
     )
     if trained != asked:

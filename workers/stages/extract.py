@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contracts.config import DESCRIPTOR_SIZES, FeatureConfig
 from contracts.errors import UnusableImage
 from contracts.records import PosedImage, Receipt, Skipped
-from index.files import write_arrays
+from index.files import read_member, write_arrays
 from index.jobs import IndexedImage, JobFolder
 from retrieval.features import Features, extract
 from survey import DecodedImage, decode_image, decode_mask
@@ -101,6 +101,6 @@ def _columns(found: list[Features], config: FeatureConfig) -> dict[str, NDArray[
 def read_channel(path: Path, channel: str) -> list[NDArray[np.uint8]]:
     """One channel of a feature file: descriptors (n, d) uint8 of each image of the shard."""
     detector = channel.split("-")[0]
-    with np.load(path, allow_pickle=False) as stored:
-        counts, descriptors = stored[f"{detector}/counts"], stored[channel]
+    counts = read_member(path, f"{detector}/counts", np.int32, 1)
+    descriptors = read_member(path, channel, np.uint8, 2)
     return np.split(descriptors, np.cumsum(counts)[:-1]) if len(counts) else []

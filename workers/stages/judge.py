@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from contracts.errors import UnusableImage
 from index.opened import OpenedIndex
+from index.selecting import candidates
 from retrieval.evaluation import judge
 from retrieval.fusion import full_ranking
 from survey import DecodedImage
@@ -42,17 +43,19 @@ def judge_photo(request: JudgeMessage) -> dict[str, Any]:
     index, photo, relevant, junk = query.index, query.photo, query.relevant, query.junk
     chosen = choose(index, photo, request.search, junk)
     scores = search_photo(index, photo, chosen, request.search)
-    ranking = full_ranking(scores)
+    ids = candidates(index, request.search.where).ids
+    order = full_ranking(scores)
+    ranking = ids[order]
     seconds = time.perf_counter() - started
     result = judge(request.query, ranking, relevant, junk, chosen.detectors, chosen.k, seconds)
     top = [
         {
             "image_id": image,
-            "score": float(scores.values[image]),
+            "score": float(score),
             "hit": image in relevant - junk,
             "junk": image in junk,
         }
-        for image in ranking[:SHOWN].tolist()
+        for image, score in zip(ranking[:SHOWN].tolist(), scores.values[order[:SHOWN]], strict=True)
     ]
     return {**asdict(replace(result, choice=chosen.choice)), "top": top}
 
@@ -77,7 +80,7 @@ def read_query(request: JudgeMessage) -> Query | dict[str, Any]:
     except UnusableImage as error:
         return {"query": request.query, "error": str(error)}
     # What the truth calls junk, and the query itself where it is indexed too.
-    itself = index.images_by_sha256.get(photo.decoded.sha256, ())
+    itself = index.images_of_file(photo.decoded.sha256)
     query = Query(index, photo, set(request.relevant), {*request.junk, *itself})
     if not query.relevant - query.junk:
         return {"query": request.query, "excluded": True}

@@ -1,7 +1,7 @@
 """Place: the matches of a photo become GeoJSON features, and with them what they say together.
 
 The estimate is where the photographer stood, the target what they looked at; both are had from
-the first few matches, and how sure they are from the scores of all images.
+the first few matches, and how sure they are from the scores of all candidates.
 """
 
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contracts.config import SearchConfig
 from contracts.records import Match
 from geo.confidence import Evidence, prominence
 from geo.estimate import LonLatConsensus, consensus_lon_lat
@@ -41,8 +42,8 @@ ESTIMATE_FROM = 10
 class Finding:
     """What the first matches say together, and what speaks for it.
 
-    distances_m : (n,) from the place to cameras all over the survey. position_error_m : that the
-    survey states for the matches, 0 where it states none.
+    distances_m : (n,) from the place to cameras all over the ground searched. position_error_m :
+    that the survey states for the matches, 0 where it states none.
     """
 
     place: LonLatConsensus
@@ -57,19 +58,20 @@ def place(
     query: str,
     chosen: Chosen,
     matches: Sequence[Match],
-    top: int,
+    search: SearchConfig,
     scores: Scores,
 ) -> list[Feature]:
-    """The first `top` matches as features, then the estimate and the target where there are any.
+    """The first matches as features, then the estimate and the target where there are any.
 
-    matches : the first of the ranking, `ESTIMATE_FROM` or more. scores : of all images.
+    matches : the first of the ranking, `ESTIMATE_FROM` or more; `search.top` are told. scores : of
+    all candidates.
     """
     rows = index.catalogue.rows([match.image_id for match in matches])
-    ground = ground_of(index)
+    ground = ground_of(index, search.where)
     spots = spots_of(rows, ground)
     features = [
         match_feature(_placed(index, query, chosen, match, row, spots, at))
-        for at, (match, row) in enumerate(zip(matches[:top], rows, strict=False))
+        for at, (match, row) in enumerate(zip(matches[: search.top], rows, strict=False))
     ]
     if ground is None:
         return features
@@ -81,7 +83,7 @@ def place(
 
 
 def searched_density(index: OpenedIndex, chosen: Chosen) -> float:
-    """Mean share of the images that a word of the chosen detectors is in."""
+    """Mean share of the images that a word of the chosen detectors is in, candidates or not."""
     descriptors = index.config.features.descriptors
     return index.density([f"{det}-{desc}" for det in chosen.detectors for desc in descriptors])
 
@@ -98,7 +100,7 @@ def find(
 
     Parameters
     ----------
-    matches, rows, spots : of the first of the ranking, in one order.
+    matches, rows, spots : of the first of the ranking, in one order. scores : of all candidates.
     density : mean share of the images that a word of the channels searched is in.
     """
     first = slice(0, ESTIMATE_FROM)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from contracts.config import Weight
+from index.selecting import candidates
 from index.votes import write_outcomes, write_votes
 from retrieval.candidates import FirstLook, candidate_features
 from retrieval.ways import Outcome, ap_together, outcomes
@@ -25,13 +26,15 @@ def rehearse_photo(request: RehearseMessage) -> dict[str, Any]:
     query = read_query(request)
     if not isinstance(query, Query):
         return query
-    index, photo, relevant, junk = query.index, query.photo, query.relevant, query.junk
+    index, photo = query.index, query.photo
+    among = candidates(index, request.search.where)
+    relevant, junk = among.places(query.relevant), among.places(query.junk)
     detectors = index.config.features.detectors
     own = (request.search.vote, _ordered(request.search.weights))
     answer: dict[str, Any] = {
         "query": request.query,
-        "relevant": sorted(relevant),
-        "junk": sorted(junk),
+        "relevant": sorted(query.relevant),
+        "junk": sorted(query.junk),
     }
     found: list[Outcome] = []
     words = words_of(index, photo, detectors, max(request.ks), request.search)

@@ -1,7 +1,7 @@
 """Retrieve: a photo, its words, and the fusion of their inverted indices."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from contracts.config import Descriptor, Detector, FeatureConfig, IndexConfig, SearchConfig
 from contracts.errors import BadConfig
-from contracts.records import Frames
+from contracts.records import Frames, Match
 from index.opened import OpenedIndex
+from index.selecting import candidates
 from retrieval.complementarity import Complementarity, all_pairs
 from retrieval.descriptors import describe
 from retrieval.detectors import detect
-from retrieval.fusion import ChannelQuery, Scores, fuse
+from retrieval.fusion import ChannelQuery, Scores, fuse, rank
 from retrieval.late_fusion import standardised_sum
 from retrieval.pyramid import Pyramid, build_pyramid
 from retrieval.ways import fused_group
@@ -41,14 +42,8 @@ class Configured(Protocol):
 
 @lru_cache(maxsize=2)
 def open_index(root: str, generation: int) -> OpenedIndex:
-    """The index stays open between the photos that a process works on."""
-    opened = OpenedIndex(Path(root))
-    if opened.generation.number != generation:
-        raise BadConfig(
-            f"{root} is at generation {opened.generation.number}, asked for {generation}. "
-            "It was written to in between: run the command again."
-        )
-    return opened
+    """One generation of an index, whichever is live by now, open between a process's photos."""
+    return OpenedIndex(Path(root), generation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,23 +130,47 @@ def nearest_words(
     }
 
 
-def channel_query(
+def channel_queries(
     index: OpenedIndex,
     channel: str,
     nearest: tuple[NDArray[np.int32], NDArray[np.float32]],
-    k: int,
+    ks: Sequence[int],
     search: SearchConfig,
-) -> ChannelQuery:
-    """What fusion needs of one channel: the first k of the words found, and their postings."""
+) -> dict[int, ChannelQuery]:
+    """What fusion needs of one channel, for every k: the first k of the words found, their images.
+
+    Each word's list is read once, whoever asks for it; the words of a query are numbers in these
+    lists.
+    """
+    word_ids, sq_dist = (each[:, : max(ks)] for each in nearest)
+    asked, at = np.unique(word_ids, return_inverse=True)
+    words, numbers = asked.astype(np.int64), at.reshape(word_ids.shape).astype(np.int32)
+    postings = index.lists(channel, words, candidates(index, search.where).kept)
+    idf = index.idf(channel, words) if "idf" in search.weights else None
     codebook = index.searcher(channel).codebook
-    return ChannelQuery(
-        word_ids=np.ascontiguousarray(nearest[0][:, :k]),
-        sq_dist=np.ascontiguousarray(nearest[1][:, :k]),
-        dmin=codebook.dmin,
-        dmax=codebook.farthest(k, search.distance_scale),
-        postings=index.postings(channel),
-        idf=index.idf(channel) if "idf" in search.weights else None,
-    )
+    return {
+        k: ChannelQuery(
+            word_ids=np.ascontiguousarray(numbers[:, :k]),
+            sq_dist=np.ascontiguousarray(sq_dist[:, :k]),
+            dmin=codebook.dmin,
+            dmax=codebook.farthest(k, search.distance_scale),
+            postings=postings,
+            idf=idf,
+        )
+        for k in ks
+    }
+
+
+def of_candidates(index: OpenedIndex, scores: Scores, search: SearchConfig) -> Scores:
+    """Scores of all images, left to those that a search may find and numbered as they are."""
+    among = candidates(index, search.where)
+    return Scores(among.of(scores.values), among.of(scores.touched))
+
+
+def best_matches(index: OpenedIndex, scores: Scores, search: SearchConfig, top: int) -> list[Match]:
+    """The first `top` candidates of a ranking, by the ids that the index has for them."""
+    ids = candidates(index, search.where).ids
+    return [replace(match, image_id=int(ids[match.image_id])) for match in rank(scores, top)]
 
 
 def densities(
@@ -167,11 +186,12 @@ def densities(
 def sizes_of(
     index: OpenedIndex, detectors: Sequence[Detector], search: SearchConfig
 ) -> dict[Detector, NDArray[np.int64]] | None:
-    """By detector, the distinct words of each image, where the weight `norm` wants them."""
+    """By detector, the distinct words of each candidate, where the weight `norm` wants them."""
     if "norm" not in search.weights:
         return None
+    among, descriptors = candidates(index, search.where), descriptors_of(index, search)
     return {
-        name: index.distinct_words([f"{name}-{each}" for each in descriptors_of(index, search)])
+        name: among.of(index.distinct_words([f"{name}-{each}" for each in descriptors]))
         for name in detectors
     }
 
@@ -194,7 +214,7 @@ def detector_votes(
     ks: Sequence[int],
     search: SearchConfig,
 ) -> dict[tuple[Detector, int], Scores]:
-    """Search with each detector alone and every k; scores before `norm`.
+    """Search with each detector alone and every k; scores of all candidates, before `norm`.
 
     words : as many a keypoint as the largest k, or more.
     """
@@ -203,16 +223,17 @@ def detector_votes(
     )
     votes = {}
     for detector, found in words.items():
+        channels = [
+            channel_queries(index, name, nearest, ks, search) for name, nearest in found.items()
+        ]
         for k in ks:
-            channels = [
-                channel_query(index, name, nearest, k, search) for name, nearest in found.items()
-            ]
-            votes[detector, k] = fuse([channels], index.n_images, without_norm)
+            scores = fuse([[each[k] for each in channels]], index.n_images, without_norm)
+            votes[detector, k] = of_candidates(index, scores, search)
     return votes
 
 
 def search_photo(index: OpenedIndex, photo: Photo, chosen: Chosen, search: SearchConfig) -> Scores:
-    """Score every image of the index for a photo."""
+    """Score every candidate (`index.selecting`) for a photo, numbered as these are."""
     words = words_of(index, photo, chosen.detectors, chosen.k, search)
     votes = detector_votes(index, words, (chosen.k,), search)
     sizes = sizes_of(index, chosen.detectors, search)

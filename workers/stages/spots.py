@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contracts.config import Where
 from geo.crs import ToWgs84
-from geo.headings import true_headings_deg
-from geo.magnetic import decimal_years, declination_deg
+from geo.poses import Poses, true_headings_of
 from index.catalogue import CatalogueRow
 from index.opened import OpenedIndex
+from index.selecting import candidates
 
 SAMPLE = 2_000
 """Cameras that stand for a survey's extent, every so manieth."""
+ANYWHERE = Where()
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +46,19 @@ class Ground:
     lat_deg: NDArray[np.float64]
 
 
-@functools.lru_cache(maxsize=2)
-def ground_of(index: OpenedIndex) -> Ground | None:
-    """The ground of an index; None: no image has a pose."""
+@functools.lru_cache(maxsize=4)
+def ground_of(index: OpenedIndex, where: Where = ANYWHERE) -> Ground | None:
+    """The ground of an index, of those of its images that are meant; None: none has a pose."""
     if index.to_wgs84 is None:
         return None
-    posed = index.catalogue.positions()
-    easting, northing = np.array(posed, np.float64)[:: -(-len(posed) // SAMPLE)].T
-    return Ground(index.to_wgs84, *index.to_wgs84.lon_lat(easting, northing))
+    among = candidates(index, where)
+    easting = among.of(index.catalogue.numbers("easting"))
+    northing = among.of(index.catalogue.numbers("northing"))
+    posed = np.flatnonzero(np.isfinite(easting) & np.isfinite(northing))
+    if not len(posed):
+        return None
+    some = posed[:: -(-len(posed) // SAMPLE)]
+    return Ground(index.to_wgs84, *index.to_wgs84.lon_lat(easting[some], northing[some]))
 
 
 def spots_of(rows: Sequence[CatalogueRow], ground: Ground | None) -> Spots:
@@ -60,19 +67,17 @@ def spots_of(rows: Sequence[CatalogueRow], ground: Ground | None) -> Spots:
     posed = [n for n, row in enumerate(rows) if row.easting is not None]
     if ground is None or not posed:
         return spots
-    easting = _known([rows[n].easting for n in posed])
-    northing = _known([rows[n].northing for n in posed])
-    altitude = _known([rows[n].altitude_m for n in posed])
-    lon, lat, height = ground.to_wgs84.positions(easting, northing, altitude)
+    poses = Poses(
+        easting=_known([rows[n].easting for n in posed]),
+        northing=_known([rows[n].northing for n in posed]),
+        altitude_m=_known([rows[n].altitude_m for n in posed]),
+        heading_deg=_known([rows[n].heading_deg for n in posed]),
+        norths=np.array([rows[n].north for n in posed], dtype=np.str_),
+        captured_at=tuple(rows[n].captured_at for n in posed),
+    )
+    lon, lat, height = ground.to_wgs84.positions(poses.easting, poses.northing, poses.altitude_m)
     spots.lon_deg[posed], spots.lat_deg[posed], spots.height_m[posed] = lon, lat, height
-    convergence = ground.to_wgs84.convergence_deg(easting, northing)
-    headings = _known([rows[n].heading_deg for n in posed])
-    norths = np.array([rows[n].north for n in posed])
-    magnetic = np.flatnonzero(norths == "magnetic")
-    declination = np.full(len(posed), np.nan)
-    years = decimal_years([rows[posed[at]].captured_at for at in magnetic])
-    declination[magnetic] = declination_deg(lon[magnetic], lat[magnetic], height[magnetic], years)
-    spots.heading_deg[posed] = true_headings_deg(headings, norths, convergence, declination)
+    spots.heading_deg[posed] = true_headings_of(poses, ground.to_wgs84)
     return spots
 
 

@@ -27,7 +27,7 @@ def train_channel(job: JobFolder, channel: str) -> Receipt:
             reservoir.offer(keys, descriptors)
             n_points += len(descriptors)
     codebook = train_codebook(reservoir.sample(), n_words_for(n_points, config), config.seed)
-    paths = codebook_paths(job.root, plan.segment, channel)
+    paths = codebook_paths(job.root, plan.codebooks, channel)
     outputs = {
         job.relative(path): digest for path, digest in write_codebook(paths, codebook).items()
     }
