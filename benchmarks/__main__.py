@@ -5,13 +5,17 @@ import sys
 from pathlib import Path
 
 from benchmarks import (
+    codebooks,
     complementarity,
     features,
     fusion,
+    index,
     kth,
     mcap,
+    planned,
     pooled,
     poses,
+    postings,
     stereopolis,
     workers,
 )
@@ -29,6 +33,10 @@ BENCHMARKS = {
     "mcap": mcap.run,
     "sets": sets.run,
     "placing": placing.run,
+    "codebooks": codebooks.run,
+    "postings": postings.run,
+    "index": index.run,
+    "planned": planned.run,
 }
 
 

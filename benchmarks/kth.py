@@ -13,7 +13,8 @@ from coordinator.cli.show import bars
 from coordinator.engine import running_engine
 from coordinator.evaluating import report_of
 from coordinator.indexing import run_job
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
 from coordinator.querying import judge_queries
 from coordinator.truth import read_truth
 from index.opened import OpenedIndex

@@ -51,7 +51,6 @@ from retrieval.fusion import ChannelQuery, Scores, full_ranking, fuse
 from retrieval.postings import (
     build_postings,
     distinct_words,
-    document_frequency,
     inverse_document_frequency,
 )
 from retrieval.resampling import bootstrap_difference
@@ -157,7 +156,7 @@ def index_pool(
     return Channel(
         codebook,
         postings,
-        inverse_document_frequency(document_frequency(postings), len(sha256)),
+        inverse_document_frequency(np.diff(postings.indptr), len(sha256)),
         distinct_words(postings, len(sha256)),
         asking.image_ids,
         *searcher.nearest(asking.descriptors, MAX_NEIGHBOURS),

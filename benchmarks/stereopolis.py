@@ -19,7 +19,8 @@ from contracts.records import PosedImage
 from coordinator.cli.show import bars
 from coordinator.engine import Engine, running_engine
 from coordinator.indexing import run_job
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
 from coordinator.querying import Located, locate_photos
 from geo.crs import ToWgs84
 from geo.frames import LocalMetres

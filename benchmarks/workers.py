@@ -11,7 +11,8 @@ from contracts.config import IndexConfig
 from coordinator.cli.show import bars
 from coordinator.engine import running_engine
 from coordinator.indexing import run_job
-from coordinator.plan import make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import make_plan
 from survey import ReadOptions
 from workers.run import worker_environment
 

@@ -1,135 +1,120 @@
-"""How often real images, and the keypoints of real photos, have each visual word."""
+"""Measuring on real images how words are used: how often, and by which images together."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
+import os
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.table import print_table
-from contracts.config import DESCRIPTORS, Detector, FeatureConfig, IndexConfig
-from coordinator.cli.show import bars
-from coordinator.engine import running_engine
-from coordinator.indexing import run_job
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
-from index.opened import OpenedIndex
+from benchmarks.fusion import word_use
+from benchmarks.fusion.word_use import WordUse
+from contracts.config import CodebookConfig, Detector, FeatureConfig
+from contracts.records import PosedImage, Postings
+from coordinator.intake import read_surveys
+from retrieval.codebooks import (
+    SampleReservoir,
+    WordSearcher,
+    build_search,
+    n_words_for,
+    sample_keys,
+    train_codebook,
+)
+from retrieval.postings import build_postings
 from survey import ReadOptions
-from workers.stages.retrieve import nearest_words, read_photo
+from workers.stages.extract import image_features
 
 PAIR: tuple[Detector, ...] = ("hesaff", "mser")
 K = 2
-_QUERY_STEP = 3
-"""Every third of the 50 photos is read."""
-_SHARES = (0.001, 0.01, 0.05, 0.1, 0.25, 0.5, 1.0)
+
+_KEPT_IN = "FLANEUR_WORD_USE"
+"""A folder for what was measured: extraction takes minutes, and its result is always the same."""
+
+_Descriptors = Mapping[str, Sequence[NDArray[np.uint8]]]
 
 
-@dataclass(frozen=True, slots=True)
-class WordUse:
-    """One channel of a real index, its words by descending document frequency.
+def measure(data: Path, max_words: Sequence[int]) -> Iterator[Mapping[str, WordUse]]:
+    """Index the facades of KTH and the survey of Stereopolis, and ask with KTH's photos.
 
-    frequency : (V,) int64, images that have each word. words_per_image : their mean number.
-    ranks : (n, K) int64, places in that order of the words of n keypoints of photos.
-    sq_dist : (n, K) float32, their distances.
+    Yields one measurement for each size of codebooks, or fewer words where the images do not
+    give so many.
     """
+    kept = os.environ.get(_KEPT_IN)
+    described: tuple[_Descriptors, list[str], _Descriptors] | None = None
+    for limit in max_words:
+        path = Path(kept or "") / f"word-use-{limit}.npz"
+        if kept and path.is_file():
+            yield word_use.load(path)
+            continue
+        described = described or _described(data)
+        config = CodebookConfig(max_words=limit)
+        images, digests, photos = described
+        channels = {name: _channel(images[name], digests, photos[name], config) for name in images}
+        if kept:
+            word_use.save(path, channels)
+        yield channels
 
-    frequency: NDArray[np.int64]
-    words_per_image: float
-    ranks: NDArray[np.int64]
-    sq_dist: NDArray[np.float32]
 
-    def relative_frequency(self) -> NDArray[np.float64]:
-        """Document frequency as a multiple of its mean; (V,)."""
-        relative: NDArray[np.float64] = self.frequency / self.frequency.mean()
-        return relative
-
-
-def measure(data: Path, root: Path) -> Mapping[str, WordUse]:
-    """Index the facades of KTH and the survey of Stereopolis, and ask with KTH's photos."""
+def _described(data: Path) -> tuple[_Descriptors, list[str], _Descriptors]:
+    """Describe all images, in the order of their uris, and all photos; images' sha256."""
     cv2.setNumThreads(1)
-    index = _indexed(data, root)
-    photos = sorted((data / "kth-buildings" / "queries").glob("*.jpg"))[::_QUERY_STEP]
-    found: dict[str, list[tuple[NDArray[np.int32], NDArray[np.float32]]]] = {}
-    for path in photos:
-        photo = read_photo(index, str(path))
-        for detector in PAIR:
-            for channel, nearest in nearest_words(index, photo, detector, DESCRIPTORS, K).items():
-                found.setdefault(channel, []).append(nearest)
-    print(f"{index.n_images} images, {len(photos)} photos, {K} words a keypoint\n")
-    return {channel: _word_use(index, channel, nearest) for channel, nearest in found.items()}
-
-
-def print_frequencies(channels: Mapping[str, WordUse]) -> None:
-    """Print rank frequency and document frequency of every channel."""
-    header = ("most frequent words", *channels)
-    print("Share of the photos' words (rank frequency)\n")
-    rows = [
-        (
-            f"{share:.1%}",
-            *(
-                f"{(use.ranks < share * len(use.frequency)).mean():.3f}"
-                for use in channels.values()
-            ),
-        )
-        for share in _SHARES
-    ]
-    print_table(header, rows)
-    print("\nImages that have the last of them, as a multiple of the mean (document frequency)\n")
-    rows = [
-        (
-            f"{share:.1%}",
-            *(
-                f"{use.relative_frequency()[int(share * (len(use.frequency) - 1))]:.2f}"
-                for use in channels.values()
-            ),
-        )
-        for share in _SHARES
-    ]
-    print_table(header, rows)
-    print()
-    print_table(
-        ("channel", "words", "an image", "images a word", "images a photo's word"),
-        [
-            (
-                name,
-                len(use.frequency),
-                f"{use.words_per_image:.0f}",
-                f"{use.frequency.mean():.1f}",
-                f"{use.frequency[use.ranks].mean():.1f}",
-            )
-            for name, use in channels.items()
-        ],
-    )
-
-
-def _indexed(data: Path, root: Path) -> OpenedIndex:
     sources = [
         ("", data / "kth-buildings" / "references"),
         ("stereopolis-paris6", data / "stereopolis-paris6"),
     ]
-    config = IndexConfig(features=FeatureConfig(detectors=PAIR))
-    with running_engine(None, None) as engine, bars() as progress:
-        intake = read_surveys(sources, ReadOptions(no_pose=True))
-        job, plan = make_plan(root, intake, config, DEFAULT_SHARD_SIZE)
-        run_job(job, plan, intake, nullcontext(engine), progress)
-    return OpenedIndex(root)
+    intake = read_surveys(sources, ReadOptions(no_pose=True))
+    photos = sorted((data / "kth-buildings" / "queries").glob("*.jpg"))
+    described, digests = _features(intake.images)
+    asked, _ = _features([PosedImage(path.name, str(path)) for path in photos])
+    return described, digests, asked
 
 
-def _word_use(
-    index: OpenedIndex,
-    channel: str,
-    nearest: Sequence[tuple[NDArray[np.int32], NDArray[np.float32]]],
+def _features(images: Sequence[PosedImage]) -> tuple[_Descriptors, list[str]]:
+    config = FeatureConfig(detectors=PAIR)
+    described: dict[str, list[NDArray[np.uint8]]] = defaultdict(list)
+    digests = []
+    for image in images:
+        decoded, features = image_features(image, config)
+        digests.append(decoded.sha256)
+        for name, descriptors in features.descriptors.items():
+            described[name].append(descriptors)
+    return described, digests
+
+
+def _channel(
+    images: Sequence[NDArray[np.uint8]],
+    digests: Sequence[str],
+    photos: Sequence[NDArray[np.uint8]],
+    config: CodebookConfig,
 ) -> WordUse:
-    postings = index.postings(channel)
-    frequency = np.diff(postings.indptr)
-    by_frequency = np.argsort(-frequency, kind="stable")
-    rank_of = np.empty(len(frequency), dtype=np.int64)
-    rank_of[by_frequency] = np.arange(len(frequency))
+    """Train words, find those of images and photos, and put them in order of frequency."""
+    reservoir = SampleReservoir(config.max_train_points)
+    for digest, descriptors in zip(digests, images, strict=True):
+        reservoir.offer(sample_keys(digest, len(descriptors), config.seed), descriptors)
+    n_words = n_words_for(sum(map(len, images)), config)
+    codebook = train_codebook(reservoir.sample(), n_words, config.seed)
+    searcher = WordSearcher(codebook, build_search(codebook.words))
+    word_ids = searcher.nearest(np.concatenate(images), 1)[0][:, 0]
+    words, sq_dist = searcher.nearest(np.concatenate(photos), K)
+
+    frequency = np.diff(_postings(word_ids, images, len(codebook.words)).indptr)
+    place = np.empty(len(frequency), dtype=np.int32)
+    place[np.argsort(-frequency, kind="stable")] = np.arange(len(frequency))
     return WordUse(
-        frequency[by_frequency],
-        len(postings.image_ids) / index.n_images,
-        rank_of[np.concatenate([words for words, _ in nearest])],
-        np.concatenate([sq_dist for _, sq_dist in nearest]),
+        len(images),
+        _postings(place[word_ids], images, len(frequency)),
+        place[words],
+        sq_dist,
+        np.concatenate([[0], np.cumsum([len(photo) for photo in photos])]),
+        codebook.dmin,
+        codebook.farthest(K, "range"),
     )
+
+
+def _postings(
+    word_ids: NDArray[np.int32], images: Sequence[NDArray[np.uint8]], n_words: int
+) -> Postings:
+    image_ids = np.repeat(np.arange(len(images), dtype=np.uint32), [len(one) for one in images])
+    return build_postings(word_ids, image_ids, n_words)

@@ -1,81 +1,101 @@
-"""Postings of a large survey, with the frequencies that were measured on a small one."""
+"""A large survey's use of words, as it was measured on a small one: how often, and together."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import gcd
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.fusion.measured import PAIR, K, WordUse
-from contracts.config import DESCRIPTORS
+from benchmarks.fusion.word_use import WordUse
 from contracts.records import Postings
-from retrieval.fusion import ChannelQuery
 
-N_KEYPOINTS = 1000
+_EQUAL = 1.1
+"""Words whose document frequencies differ by less than this factor may change places."""
 
 
 @dataclass(frozen=True, slots=True)
-class Size:
-    """A survey to simulate, and what fusing one pair may take.
+class SimulatedChannel:
+    """One channel of a survey that is copies of the real streets, each with words of its own.
 
-    words_per_image : of one channel; None: as measured.
+    Within a copy, images share what they share in reality. From copy to copy, words of about
+    equal document frequency change places, and a rank stands for the same part of a larger
+    vocabulary: so every word keeps its frequency, and copies share words only by chance.
     """
 
+    use: WordUse
     n_images: int
     n_words: int
-    words_per_image: float | None
-    bar_ms: float
+    seed: int
+
+    @property
+    def n_copies(self) -> int:
+        return -(-self.n_images // self.use.n_images)
+
+    @property
+    def _stride(self) -> int:
+        """By which ranks are scattered: about the golden section of the words, prime to them."""
+        return next(
+            stride
+            for stride in range(round(0.618 * self.n_words), 2 * self.n_words)
+            if gcd(stride, self.n_words) == 1
+        )
+
+    def words_of(self, copy: int) -> NDArray[np.int32]:
+        """The word that each real one is in this copy, all different; (V,) int32."""
+        frequency = self.use.frequency
+        rng = np.random.default_rng((self.seed, copy))
+        level = np.floor(np.log(np.maximum(frequency, 0.5)) / np.log(_EQUAL))
+        place = np.argsort(-level + rng.random(len(level)))
+        edges = np.arange(len(place) + 1) * self.n_words // len(place)
+        ranks = rng.integers(edges[place], edges[place + 1])
+        # A codebook does not have its words in the order of their frequency.
+        words: NDArray[np.int32] = (ranks * self._stride % self.n_words).astype(np.int32)
+        return words
+
+    def pairs(self, copy: int) -> tuple[NDArray[np.int32], NDArray[np.uint32]]:
+        """(word, image) of every posting of a copy's images."""
+        word_ids = np.repeat(self.words_of(copy), self.use.frequency)
+        image_ids = self.use.postings.image_ids.astype(np.int64) + copy * self.use.n_images
+        there = image_ids < self.n_images
+        return word_ids[there], image_ids[there].astype(np.uint32)
+
+    def keys(self, copy: int) -> NDArray[np.uint64]:
+        """The same as the partial inverted index of a shard, word << 32 | image ascending."""
+        word_ids, image_ids = self.pairs(copy)
+        keys = word_ids.astype(np.uint64) << np.uint64(32) | image_ids
+        keys.sort()  # and not `posting_keys`: no pair is there twice
+        return keys
+
+    def photo(self, number: int, copy: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Words and squared distances of a photo's keypoints, taken where the copy is."""
+        words, sq_dist = self.use.photo(number)
+        return self.words_of(copy)[words], sq_dist
+
+    def lists(self, words: NDArray[np.int32]) -> Postings:
+        """The images of some words, in their order; all others are never made."""
+        place = np.full(self.n_words, -1, dtype=np.int64)
+        place[words] = np.arange(len(words))
+        keys = np.concatenate(list(self._keys_at(place)))
+        keys.sort()
+        indptr = np.searchsorted(keys, np.arange(len(words) + 1) << 32)
+        return Postings(indptr, keys.astype(np.uint32))
+
+    def _keys_at(self, place: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+        """By copy, place << 32 | image of the words that have a place."""
+        starts, frequency = self.use.postings.indptr[:-1], self.use.frequency
+        for copy in range(self.n_copies):
+            at = place[self.words_of(copy)]
+            asked = np.flatnonzero(at >= 0)
+            lengths = frequency[asked]
+            firsts = np.cumsum(lengths) - lengths
+            chosen = np.arange(lengths.sum()) + np.repeat(starts[asked] - firsts, lengths)
+            images = self.use.postings.image_ids[chosen] + np.int64(copy * self.use.n_images)
+            keys = np.repeat(at[asked] << 32, lengths) | images
+            yield keys[images < self.n_images]
 
 
-def simulated_photo(
-    channels: Mapping[str, WordUse], size: Size, seed: int
-) -> list[list[ChannelQuery]]:
-    """Draw a photo's keypoints in every channel of the pair, and the postings of their words.
-
-    Channels are drawn independently: fewer images are found by several than in a real survey.
-    """
-    rng = np.random.default_rng(seed)
-    return [
-        [simulated_channel(channels[f"{detector}-{name}"], size, rng) for name in DESCRIPTORS]
-        for detector in PAIR
-    ]
-
-
-def simulated_channel(use: WordUse, size: Size, rng: np.random.Generator) -> ChannelQuery:
-    """Draw keypoints by their words' rank, and each word's images by its document frequency.
-
-    A rank stands for the same part of a larger vocabulary. Only words that are asked for are
-    given their postings, one after the other: what is not asked for is not read.
-    """
-    keypoints = rng.integers(0, len(use.ranks), N_KEYPOINTS)
-    stretch = size.n_words / len(use.frequency)
-    ranks = ((use.ranks[keypoints] + rng.random((N_KEYPOINTS, K))) * stretch).astype(np.int64)
-    for later in range(1, K):
-        taken = (ranks[:, :later] == ranks[:, later : later + 1]).any(axis=1)
-        ranks[taken, later] = (ranks[taken, later] + 1) % size.n_words
-    words = np.unique(ranks)
-    per_image = size.words_per_image or use.words_per_image
-    mean = size.n_images * per_image / size.n_words
-    wanted = use.relative_frequency()[(words / stretch).astype(np.int64)] * mean
-    lists = [_some_images(rng, size.n_images, max(round(count), 1)) for count in wanted]
-    frequency = np.zeros(size.n_words, dtype=np.int64)
-    frequency[words] = [len(images) for images in lists]
-    idf = np.zeros(size.n_words)
-    idf[words] = np.log(size.n_images / frequency[words])
-    return ChannelQuery(
-        ranks.astype(np.int32),
-        use.sq_dist[keypoints],
-        float(use.sq_dist[:, 0].min()),
-        float(use.sq_dist.max()),
-        Postings(np.concatenate([[0], np.cumsum(frequency)]), np.concatenate(lists)),
-        idf,
-    )
-
-
-def _some_images(rng: np.random.Generator, n_images: int, count: int) -> NDArray[np.uint32]:
-    """Draw ascending images; draws that hit one twice are made up for by as many more."""
-    count = min(count, n_images)
-    images = np.unique(rng.integers(0, n_images, count))
-    while len(images) < count:
-        images = np.union1d(images, rng.integers(0, n_images, count - len(images)))
-    return images.astype(np.uint32)
+def copies_asked(channel: SimulatedChannel, n_photos: int) -> Sequence[int]:
+    """The copies in which photos are taken: spread over the survey, whole ones."""
+    last = max(channel.n_images // channel.use.n_images - 1, 0)
+    return [round(share * last) for share in np.linspace(0, 1, n_photos)]

@@ -4,25 +4,39 @@ import resource
 import time
 import tracemalloc
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from statistics import median
 
 import numba
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from benchmarks.fusion.measured import K, WordUse
-from benchmarks.fusion.simulated import N_KEYPOINTS, Size, simulated_photo
+from benchmarks.fusion.measured import PAIR, K
+from benchmarks.fusion.simulated import SimulatedChannel, copies_asked
 from benchmarks.fusion.sparse_products import as_matrix, best_of_union
+from benchmarks.fusion.word_use import WordUse
 from benchmarks.table import print_table
-from contracts.config import FeatureConfig, SearchConfig
+from contracts.config import DESCRIPTORS, SearchConfig
 from retrieval.fusion import ChannelQuery, fuse, rank
+from retrieval.postings import inverse_document_frequency
 
-SIZES = (
-    Size(7_000, 20_000, None, 20),
-    # With so many words hardly two frames of an image share one: the most there can be.
-    Size(1_000_000, 1_000_000, FeatureConfig().max_frames, 250),
-)
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """A survey to simulate, and what fusing one pair may take.
+
+    measured_words : size of the codebooks of which the use of words was measured.
+    """
+
+    n_images: int
+    n_words: int
+    measured_words: int
+    bar_ms: float
+
+
+SIZES = (Size(7_000, 20_000, 20_000, 20), Size(1_000_000, 1_000_000, 100_000, 250))
 SEARCHES = {
     "union": SearchConfig(vote="union"),
     "union, burst": SearchConfig(vote="union", weights=("idf", "norm", "burst")),
@@ -33,29 +47,57 @@ SEARCHES = {
 }
 PEER = f"scipy {scipy.__version__} sparse products, union"
 TOP = 100
-N_PHOTOS = 3
+PHOTOS = (0, 17, 34)
+"""Of the 50: one of each third."""
 ROUNDS = 9
 
 Photo = Sequence[Sequence[ChannelQuery]]
 
 
-def run(channels: Mapping[str, WordUse]) -> None:
-    """Time every rule at every size; rounds take turns over all rules and photos.
+def run(size: Size, channels: Mapping[str, WordUse]) -> None:
+    """Time every rule; rounds take turns over all rules and photos.
 
     CPU time says what is to be had on a computer that has other work.
     """
     numba.set_num_threads(1)
-    for size in SIZES:
-        photos = [simulated_photo(channels, size, seed) for seed in range(N_PHOTOS)]
-        print(
-            f"\n{size.n_images:,} images, {size.n_words:,} words a channel, {len(channels)} "
-            f"channels of {N_KEYPOINTS} keypoints, k = {K}: "
-            f"{_postings_touched(photos) / N_PHOTOS:,.0f} postings touched a photo, "
-            f"to be fused in {size.bar_ms:g} ms; {N_PHOTOS} photos, {ROUNDS} rounds\n"
-        )
-        _time(photos, size, len(channels))
+    simulated = {
+        name: SimulatedChannel(use, size.n_images, size.n_words, seed)
+        for seed, (name, use) in enumerate(channels.items())
+    }
+    asked = {name: _asked(channel) for name, channel in simulated.items()}
+    photos = [
+        [[asked[f"{detector}-{name}"][number] for name in DESCRIPTORS] for detector in PAIR]
+        for number in range(len(PHOTOS))
+    ]
+    print(
+        f"\n{size.n_images:,} images, {size.n_words:,} words a channel, {len(channels)} channels, "
+        f"k = {K}: {_postings_touched(photos) / len(photos):,.0f} postings touched a photo, to be "
+        f"fused in {size.bar_ms:g} ms; {len(photos)} photos, {ROUNDS} rounds\n"
+    )
+    words_per_image = sum(use.words_per_image for use in channels.values())
+    _time(photos, np.full(size.n_images, round(words_per_image), dtype=np.int64))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     print(f"\nThis process had {peak:.1f} GB at most, simulated postings included.")
+
+
+def _asked(channel: SimulatedChannel) -> list[ChannelQuery]:
+    """What the photos ask of one channel, and the lists of all their words."""
+    copies = copies_asked(channel, len(PHOTOS))
+    nearest = [channel.photo(number, copy) for number, copy in zip(PHOTOS, copies, strict=True)]
+    words = np.unique(np.concatenate([word_ids.ravel() for word_ids, _ in nearest]))
+    lists = channel.lists(words)
+    idf = inverse_document_frequency(np.diff(lists.indptr), channel.n_images)
+    return [
+        ChannelQuery(
+            np.searchsorted(words, word_ids).astype(np.int32),
+            sq_dist,
+            channel.use.dmin,
+            channel.use.dmax,
+            lists,
+            idf,
+        )
+        for word_ids, sq_dist in nearest
+    ]
 
 
 def _postings_touched(photos: Sequence[Photo]) -> int:
@@ -67,16 +109,13 @@ def _postings_touched(photos: Sequence[Photo]) -> int:
     return total
 
 
-def _time(photos: Sequence[Photo], size: Size, n_channels: int) -> None:
-    words = size.words_per_image or FeatureConfig().max_frames
-    distinct = np.full(size.n_images, round(n_channels * words), dtype=np.int64)
+def _time(photos: Sequence[Photo], distinct: NDArray[np.int64]) -> None:
+    n_images = len(distinct)
 
     def search(photo: Photo, config: SearchConfig) -> object:
-        return rank(fuse(photo, size.n_images, config, distinct), TOP)
+        return rank(fuse(photo, n_images, config, distinct), TOP)
 
-    matrices = [
-        [[as_matrix(one, size.n_images) for one in row] for row in photo] for photo in photos
-    ]
+    matrices = [[[as_matrix(one, n_images) for one in row] for row in photo] for photo in photos]
     programs: dict[str, list[Callable[[], object]]] = {
         name: [partial(search, photo, config) for photo in photos]
         for name, config in SEARCHES.items()
@@ -86,7 +125,7 @@ def _time(photos: Sequence[Photo], size: Size, n_channels: int) -> None:
         for photo, tables in zip(photos, matrices, strict=True)
     ]
     _, expected = best_of_union(photos[0], matrices[0], distinct, TOP)
-    got = fuse(photos[0], size.n_images, SEARCHES["union"], distinct).values
+    got = fuse(photos[0], n_images, SEARCHES["union"], distinct).values
     assert np.allclose(got, expected, rtol=1e-9, atol=1e-9), "the peer computes something else"
     for calls in programs.values():
         calls[0]()

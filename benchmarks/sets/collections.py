@@ -18,7 +18,8 @@ from coordinator.cli.show import bars
 from coordinator.demo import CONFIG as DEMO_CONFIG
 from coordinator.engine import Engine
 from coordinator.indexing import run_job
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan, read_surveys
+from coordinator.intake import read_surveys
+from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
 from coordinator.querying import Rules, rehearse_queries
 from coordinator.truth import JudgedQuery, read_truth
 from index.opened import OpenedIndex
