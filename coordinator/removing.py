@@ -17,9 +17,11 @@ from contracts.config import Where
 from contracts.errors import BadConfig
 from contracts.progress import Progress
 from coordinator.committing import file_entries, now
+from index.codebooks import count_words
 from index.commits import Writer, writing
 from index.manifest import FileEntry, Generation, read_generation
 from index.opened import OpenedIndex
+from index.segments import map_segment, segment_paths
 from index.selecting import selected
 from index.tombstones import count_left, tombstones_folder, write_tombstones
 from retrieval.packing import Part
@@ -152,7 +154,9 @@ def _bury(
     segment = index.generation.segments[position]
     left = {}
     for channel in index.config.features.channels():
-        packed = index.parts(channel)[position].packed
+        paths = segment_paths(index.root, segment.name, channel)
+        n_words = count_words(index.root, index.generation.codebooks, channel)
+        packed = map_segment(paths, n_words, segment.n_images)
         left[channel] = count_left(Part(packed, 0, segment.n_images), removed)
     written = write_tombstones(tombstones_folder(index.root, name, segment.name), removed, left)
     return file_entries(

@@ -170,8 +170,12 @@ def check_files(root: Path, sizes: Mapping[str, int]) -> None:
             )
 
 
-def map_array(path: Path, dtype: type[Scalar], ndim: int) -> NDArray[Scalar]:
+def map_array(
+    path: Path, dtype: type[Scalar], ndim: int, *, scattered: bool = False
+) -> NDArray[Scalar]:
     """Memory-map a .npy file, read-only; its header must say what is expected, and no more.
+
+    scattered : little of it will be read, here and there: the system shall not read ahead.
 
     Raises
     ------
@@ -184,6 +188,8 @@ def map_array(path: Path, dtype: type[Scalar], ndim: int) -> NDArray[Scalar]:
             start, size = stream.tell(), os.fstat(stream.fileno()).st_size
             _check_size(size - start, shape, np.dtype(dtype))
             mapped = mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_READ)
+        if scattered and hasattr(mmap, "MADV_RANDOM"):
+            mapped.madvise(mmap.MADV_RANDOM)
         return np.frombuffer(mapped, dtype, offset=start).reshape(shape)
     except (OSError, ValueError) as error:
         raise BadIndex(

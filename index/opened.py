@@ -118,7 +118,10 @@ class OpenedIndex:
             self._parts[channel] = tuple(
                 Part(
                     map_segment(
-                        segment_paths(self.root, segment.name, channel), n_words, segment.n_images
+                        segment_paths(self.root, segment.name, channel),
+                        n_words,
+                        segment.n_images,
+                        scattered=True,
                     ),
                     ids.start,
                     segment.n_images,

@@ -42,16 +42,20 @@ def segment_paths(root: Path, segment: str, channel: str) -> SegmentPaths:
     )
 
 
-def map_segment(paths: SegmentPaths, n_words: int, n_images: int) -> PackedPostings:
+def map_segment(
+    paths: SegmentPaths, n_words: int, n_images: int, *, scattered: bool = False
+) -> PackedPostings:
     """Map a channel read-only; headers and sizes are checked here, bytes when they are unpacked.
+
+    scattered : some words will be read, not one after the other; as in `map_array`.
 
     Raises
     ------
     BadIndex : a file is missing or damaged, or they do not fit each other.
     """
-    offsets = map_array(paths.offsets, np.int64, 1)
-    counts = map_array(paths.counts, np.uint32, 1)
-    packed = map_array(paths.packed, np.uint8, 1)
+    offsets = map_array(paths.offsets, np.int64, 1, scattered=scattered)
+    counts = map_array(paths.counts, np.uint32, 1, scattered=scattered)
+    packed = map_array(paths.packed, np.uint8, 1, scattered=scattered)
     expected = {
         paths.offsets: (len(offsets), n_words + 1),
         paths.counts: (len(counts), n_words),

@@ -18,3 +18,19 @@ def test_nothing_of_words_lists_and_images_is_read_to_open_an_index(tmp_path: Pa
     for read in (lambda: opened.kept, lambda: opened.parts("hesaff-sift")):
         with pytest.raises(BadIndex):
             read()
+
+
+@pytest.mark.skipif(
+    not Path("/proc/self/smaps").exists(), reason="Linux tells how files are mapped"
+)
+def test_lists_are_mapped_so_that_the_system_reads_no_more_than_is_asked(tmp_path: Path) -> None:
+    made_index(tmp_path)
+    opened = OpenedIndex(tmp_path)
+    opened.parts("hesaff-sift")
+    _, _, mapping = (
+        Path("/proc/self/smaps")
+        .read_text()
+        .partition(str(tmp_path / "segments/0001/hesaff-sift/packed.npy"))
+    )
+    flags = mapping.partition("VmFlags:")[2].partition("\n")[0].split()
+    assert "rr" in flags  # random read
