@@ -26,6 +26,9 @@ from contracts.errors import BadIndex
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
+READ_AHEAD_BYTES = 1 << 28
+"""A smaller file is sooner read as a whole than page by page."""
+
 MAX_TEXT_BYTES = 32 * 2**20
 """Of a JSON file that is read at once: room for the files of some two thousand segments."""
 
@@ -175,7 +178,8 @@ def map_array(
 ) -> NDArray[Scalar]:
     """Memory-map a .npy file, read-only; its header must say what is expected, and no more.
 
-    scattered : little of it will be read, here and there: the system shall not read ahead.
+    scattered : parts of it will be read, here and there: in a large file the system shall not
+    read ahead of them.
 
     Raises
     ------
@@ -188,7 +192,7 @@ def map_array(
             start, size = stream.tell(), os.fstat(stream.fileno()).st_size
             _check_size(size - start, shape, np.dtype(dtype))
             mapped = mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_READ)
-        if scattered and hasattr(mmap, "MADV_RANDOM"):
+        if scattered and size > READ_AHEAD_BYTES and hasattr(mmap, "MADV_RANDOM"):
             mapped.madvise(mmap.MADV_RANDOM)
         return np.frombuffer(mapped, dtype, offset=start).reshape(shape)
     except (OSError, ValueError) as error:

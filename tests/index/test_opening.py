@@ -23,7 +23,10 @@ def test_nothing_of_words_lists_and_images_is_read_to_open_an_index(tmp_path: Pa
 @pytest.mark.skipif(
     not Path("/proc/self/smaps").exists(), reason="Linux tells how files are mapped"
 )
-def test_lists_are_mapped_so_that_the_system_reads_no_more_than_is_asked(tmp_path: Path) -> None:
+def test_large_lists_are_mapped_so_that_no_more_is_read_than_is_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("index.files.READ_AHEAD_BYTES", 0)
     made_index(tmp_path)
     opened = OpenedIndex(tmp_path)
     opened.parts("hesaff-sift")
