@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import accumulate
 
 from contracts.errors import BadIndex, BadSurvey
 from contracts.progress import Progress
@@ -42,7 +43,8 @@ def build(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress)
     extracts = [Order("extract", f"{n:06d}", {**where, "shard": n}) for n in missing]
     _drain(_run(follower, progress, "extract", len(shards), extracts))
     trains = [Order("train", name, {**where, "channel": name}) for name in untrained]
-    if images_indexed(job, plan) == 0:
+    indexed = [len(job.read_indexed(shard)) for shard in shards]
+    if not any(indexed):
         raise NothingReadable(
             f"Not one of the {plan.n_images} images can be read; see {job.path / 'receipts'}. "
             "Check the survey's files."
@@ -50,7 +52,8 @@ def build(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress)
     if plan.trains:
         _drain(_run(follower, progress, "train", len(channels), trains))
 
-    first_ids = _first_ids(job, plan)
+    # Ids are dense over the readable images: each shard begins where the former one ended.
+    first_ids = [0, *accumulate(indexed)]
     assigns = [
         Order("assign", f"{n:06d}", {**where, "shard": n, "first_image_id": first_ids[n]})
         for n in unassigned
@@ -59,8 +62,8 @@ def build(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress)
         job.features(int(order.key)).unlink(missing_ok=True)
     assigned = assigned_counts(job, plan)
     points = {name: assigned[f"{name}/points"] for name in channels}
-    merge(job, plan, points, images_indexed(job, plan), follower, progress, bool(unassigned))
-    return sum(len(job.read_indexed(shard)) for shard in missing)
+    merge(job, plan, points, sum(indexed), follower, progress, bool(unassigned))
+    return sum(indexed[shard] for shard in missing)
 
 
 def is_built(job: JobFolder, plan: JobPlan) -> bool:
@@ -106,11 +109,6 @@ def merge(
     _drain(_run(follower, progress, "join", len(plan.config.features.channels()), joins))
 
 
-def images_indexed(job: JobFolder, plan: JobPlan) -> int:
-    """Images that could be read."""
-    return sum(len(job.read_indexed(shard)) for shard in range(plan.n_shards))
-
-
 def assigned_counts(job: JobFolder, plan: JobPlan) -> Counter[str]:
     """What assigning counted in all shards: for each channel `/points` and `/sq_dist`."""
     counts: Counter[str] = Counter()
@@ -150,12 +148,3 @@ def _n_words(job: JobFolder, channel: str) -> int:
     if trained is None:
         raise BadIndex(f"{job.path} lacks the receipt of {channel}'s words. Run it again.")
     return trained.counts["words"]
-
-
-def _first_ids(job: JobFolder, plan: JobPlan) -> list[int]:
-    """Ids are dense over the readable images: each shard begins where the former one ended."""
-    first, ids = 0, []
-    for shard in range(plan.n_shards):
-        ids.append(first)
-        first += len(job.read_indexed(shard))
-    return ids

@@ -57,13 +57,12 @@ def find_finished(job: JobFolder) -> Generation | None:
     if not (job.root / "CURRENT").is_file():
         return None
     live = read_generation(job.root)
-    done = {name for segment in live.segments for name in segment.jobs}
-    if job.job not in done:
+    if job.job not in live.jobs:
         return None
     try:
         check_files(job.root, live.sizes)
     except BadIndex:
-        if done != {job.job} or live.n_live < live.n_images:
+        if live.jobs != {job.job} or live.n_live < live.n_images:
             raise
         return None
     return live

@@ -54,7 +54,7 @@ def prune(root: Path) -> Pruned:
 
 def _at_work(root: Path, generations: Iterable[Generation]) -> list[JobPlan]:
     """The plans of jobs that are in none of these generations yet, but that somebody works on."""
-    done = {name for each in generations for segment in each.segments for name in segment.jobs}
+    done = {name for each in generations for name in each.jobs}
     jobs = [job for job in jobs_of(root) if job.job not in done and job.has_plan()]
     return [job.read_plan() for job in jobs if is_worked_on(job)]
 

@@ -150,9 +150,9 @@ def _bytes_under(live: Generation, folder: str) -> int:
 
 
 def _unfinished(root: Path, generations: Sequence[Generation]) -> list[_Job]:
-    segments = [segment for each in generations for segment in each.segments]
-    jobs_done = {job for segment in segments for job in segment.jobs}
-    made = {segment.name for segment in segments}  # a segment names no job that compacted it
+    jobs_done = {job for each in generations for job in each.jobs}
+    # A segment names no job that compacted it.
+    made = {segment.name for each in generations for segment in each.segments}
     found: list[_Job] = []
     for job in jobs_of(root):
         if job.job in jobs_done:
@@ -208,12 +208,11 @@ def _when(seconds: float) -> str:
 def _instruction_sets(root: Path, live: Generation) -> tuple[str, ...]:
     """Of the machines that extracted its images, as far as receipts are there."""
     found: set[str] = set()
-    for segment in live.segments:
-        for name in segment.jobs:
-            job = JobFolder(root, name)
-            for path in (job.path / "receipts" / "extract").glob("*.json"):
-                receipt = job.read_receipt("extract", path.stem)
-                found |= {receipt.instruction_set} if receipt else set()
+    for name in live.jobs:
+        job = JobFolder(root, name)
+        for path in (job.path / "receipts" / "extract").glob("*.json"):
+            receipt = job.read_receipt("extract", path.stem)
+            found |= {receipt.instruction_set} if receipt else set()
     return tuple(sorted(found - {""}))
 
 

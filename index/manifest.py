@@ -133,6 +133,11 @@ class Generation(_Record):
         return sum(segment.n_skipped for segment in self.segments)
 
     @property
+    def jobs(self) -> frozenset[str]:
+        """Every job whose images it holds."""
+        return frozenset(job for segment in self.segments for job in segment.jobs)
+
+    @property
     def surveys(self) -> tuple[SurveyEntry, ...]:
         """All that went in, in the order in which they did."""
         return tuple(survey for segment in self.segments for survey in segment.surveys)

@@ -35,9 +35,14 @@ def one_thread() -> Iterator[None]:
 
 def kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArray[np.uint8]:
     """Find (n_clusters, D) whole-number centres of (n, D) points, flat or in two levels."""
-    if len(points) * n_clusters <= _FLAT_WORK:
+    if in_one_level(len(points), n_clusters):
         return flat_kmeans(points, n_clusters, seed)
     return two_level_kmeans(points, n_clusters, seed)
+
+
+def in_one_level(n_points: int, n_clusters: int) -> bool:
+    """Whether flat k-means is quick enough."""
+    return n_points * n_clusters <= _FLAT_WORK
 
 
 def flat_kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArray[np.uint8]:

@@ -25,7 +25,7 @@ _LISTS_PER_ROOT_WORD = 3.5
 _WORDS_PER_LIST_SAMPLED = 32
 """Words that centres are made from, as a multiple of their number."""
 
-_DISTANCE_SAMPLE = 10_000
+DISTANCE_SAMPLE = 10_000
 
 _SPARE_SHARE = 1.25
 """How far a reservoir may fill beyond its size before it is cut back to it."""
@@ -193,12 +193,19 @@ def sample_keys(image_sha256: str, n_frames: int, seed: int) -> NDArray[np.uint6
 
 def build_search(words: NDArray[np.uint8]) -> WordLists:
     """Group (V, D) uint8 words for the search; the same lists for any order of the words."""
-    if len(words) <= _EXHAUSTIVE_WORDS:
+    n_lists = n_lists_for(len(words))
+    if n_lists == 1:
         return one_list(words)
-    n_lists = round(_LISTS_PER_ROOT_WORD * np.sqrt(len(words)))
     sample = np.unique(words, axis=0)
     sample = sample[:: max(len(sample) // (n_lists * _WORDS_PER_LIST_SAMPLED), 1)]
     return lists_around(flat_kmeans(sample, n_lists, seed=0), words)
+
+
+def n_lists_for(n_words: int) -> int:
+    """Into how many lists so many words are grouped; 1: a descriptor is compared with every one."""
+    if n_words <= _EXHAUSTIVE_WORDS:
+        return 1
+    return round(_LISTS_PER_ROOT_WORD * math.sqrt(n_words))
 
 
 def n_words_for(n_points: int, config: CodebookConfig) -> int:
@@ -268,7 +275,7 @@ def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebo
         return Codebook(sample.copy(), 0.0, nowhere, nowhere)
     words = np.unique(kmeans(sample, n_words, seed), axis=0)
     words = words[build_search(words).word_ids]
-    return Codebook(words, *_distance_range(sample[:_DISTANCE_SAMPLE], words))
+    return Codebook(words, *_distance_range(sample[:DISTANCE_SAMPLE], words))
 
 
 def _mixed(state: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -17,7 +17,7 @@ from retrieval.channel_query import ChannelQuery, word_distances, word_factors, 
 from retrieval.fusion_kernels import Tally, Words
 from retrieval.fusion_walk import walked_votes
 from retrieval.fusion_words import beyond_catalogue, kept_words, union_votes
-from retrieval.postings import read_only
+from retrieval.kernels import read_only
 
 __all__ = ["ChannelQuery", "Scores", "full_ranking", "fuse", "rank"]
 

@@ -1,12 +1,18 @@
-"""How compiled loops are declared, once: cached, without the GIL, strict IEEE arithmetic."""
+"""How compiled loops are declared and given their arrays, once for all.
+
+Cached, without the GIL, strict IEEE arithmetic.
+"""
 
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
+from numpy.typing import NDArray
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -18,3 +24,10 @@ def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """
     compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     return cast(Callable[_P, _R], compiled)
+
+
+def read_only(array: NDArray[_Scalar], dtype: type[_Scalar]) -> NDArray[_Scalar]:
+    """Give a read-only plain view: memory maps and fresh arrays then share one compiled kernel."""
+    view = np.ascontiguousarray(array, dtype=dtype).view()
+    view.flags.writeable = False
+    return view

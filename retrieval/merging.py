@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from contracts.errors import BadIndex, WrongInput
 from contracts.records import Postings
-from retrieval.kernels import kernel
-from retrieval.postings import IMAGE, IMAGE_BITS, posting_keys, read_only
+from retrieval.kernels import kernel, read_only
+from retrieval.postings import IMAGE, IMAGE_BITS, posting_keys
 
 __all__ = [
     "POSTINGS_AT_ONCE",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from contracts.errors import BadIndex, VocabularyMismatch, WrongInput
 from contracts.records import PackedPostings, Postings
 from retrieval import packing_kernels as kernels
-from retrieval.postings import read_only
+from retrieval.kernels import read_only
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,19 +3,15 @@
 A key is word << 32 | image: a sorted set of keys is an inverted index, whatever it was made from.
 """
 
-from typing import TypeVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadIndex, VocabularyMismatch, WrongInput
 from contracts.records import Postings
-from retrieval.kernels import kernel
+from retrieval.kernels import kernel, read_only
 
 IMAGE_BITS = np.uint64(32)
 IMAGE = np.uint64(2**32 - 1)
-
-Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def posting_keys(
@@ -88,13 +84,6 @@ def distinct_words(postings: Postings, n_images: int) -> NDArray[np.int64]:
             "the index is damaged: restore it or index again"
         )
     return counts
-
-
-def read_only(array: NDArray[Scalar], dtype: type[Scalar]) -> NDArray[Scalar]:
-    """Give a read-only plain view: memory maps and fresh arrays then share one compiled kernel."""
-    view = np.ascontiguousarray(array, dtype=dtype).view()
-    view.flags.writeable = False
-    return view
 
 
 @kernel

@@ -6,15 +6,15 @@ A neighbour is handled as one int64 key, distance << 32 | word id, so that the s
 nearer word and, among equals, the smaller id.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadIndex, WrongInput
-from retrieval.kernels import kernel
+from retrieval.kernels import kernel, read_only
 
 _PROBES_PER_ROOT_LIST = 0.72
 """Lists searched, as a multiple of sqrt(C): see docs/decisions/0022."""
@@ -25,7 +25,6 @@ _BLOCK = 64
 
 _MISSING = np.iinfo(np.int64).max
 
-_Number = TypeVar("_Number", bound=np.generic)
 _Points = NDArray[np.int16]
 _Keys = NDArray[np.int64]
 _Rows = NDArray[np.int64]
@@ -90,13 +89,18 @@ def nearest_words(
     word_ids = np.empty((len(descriptors), k), dtype=np.int32)
     sq_dist = np.empty((len(descriptors), k), dtype=np.float32)
     if n_probes is None:
-        n_probes = max(round(_PROBES_PER_ROOT_LIST * np.sqrt(len(lists.centres))), 1)
+        n_probes = usual_probes(len(lists.centres))
     for start in range(0, len(descriptors) if k else 0, _BATCH):
         rows = slice(start, start + _BATCH)
         keys = _nearest_keys(_widened(descriptors[rows]), words, lists, k, n_probes)
         word_ids[rows] = keys & 0xFFFFFFFF
         sq_dist[rows] = keys >> 32
     return word_ids, sq_dist
+
+
+def usual_probes(n_lists: int) -> int:
+    """How many of so many lists a descriptor is compared with."""
+    return max(round(_PROBES_PER_ROOT_LIST * math.sqrt(n_lists)), 1)
 
 
 def compile_word_search() -> None:
@@ -139,7 +143,13 @@ def _scanned(
     keys = np.full((len(points), k), _MISSING, dtype=np.int64)
     scan = _SCANS[points.shape[1]]
     stray = scan(
-        points, _sealed(words), _sealed(lists.word_ids), _sealed(lists.starts), starts, rows, keys
+        points,
+        read_only(words, np.uint8),
+        read_only(lists.word_ids, np.int32),
+        read_only(lists.starts, np.int64),
+        starts,
+        rows,
+        keys,
     )
     if stray >= 0:
         raise BadIndex(
@@ -147,13 +157,6 @@ def _scanned(
             "restore the codebook or index again"
         )
     return keys
-
-
-def _sealed(array: NDArray[_Number]) -> NDArray[_Number]:
-    """A view as a mapped file gives it: the loops are compiled for that alone."""
-    view = np.ascontiguousarray(array).view()
-    view.flags.writeable = False
-    return view
 
 
 def _widened(descriptors: NDArray[np.uint8]) -> _Points:

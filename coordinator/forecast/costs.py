@@ -6,11 +6,9 @@ real images; `python -m benchmarks planned` holds them against what indexing tak
 
 import math
 
-_ONE_LIST_WORDS = 4_096
-_LISTS_PER_ROOT_WORD = 3.5
-_PROBES_PER_ROOT_LIST = 0.72
-"""How words are searched (retrieval/codebooks.py, word_search.py): every word up to so many; else
-the centres of the lists, and the words of some lists."""
+from retrieval.clustering import in_one_level
+from retrieval.codebooks import DISTANCE_SAMPLE, n_lists_for
+from retrieval.word_search import usual_probes
 
 _COMPARED_ALL_S = {128: 4.2e-9, 64: 2.4e-9, 36: 2.4e-9}
 _COMPARED_LISTED_S = {128: 6.8e-9, 64: 4.2e-9, 36: 4.2e-9}
@@ -18,9 +16,8 @@ _COMPARED_LISTED_S = {128: 6.8e-9, 64: 4.2e-9, 36: 4.2e-9}
 _LISTS_SORTED_S = 1.5e-6
 """To put a descriptor among those that ask for the same lists."""
 
-_FLAT_WORK = 100_000_000
 _FLAT_PRODUCT_S = {128: 60e-9, 64: 32e-9, 36: 27e-9}
-"""Training in one level (retrieval/clustering.py), up to so many points x words: for each."""
+"""Training in one level (retrieval/clustering.py): for each product of points and words."""
 
 _LEVELS_POINT_S = {128: 15e-6, 64: 8e-6, 36: 10e-6}
 _LEVELS_ROOT_WORD_S = {128: 240e-9, 64: 130e-9, 36: 140e-9}
@@ -28,8 +25,6 @@ _LEVELS_ROOT_WORD_S = {128: 240e-9, 64: 130e-9, 36: 140e-9}
 
 _GROUPING_S = {128: 0.1e-6, 64: 0.06e-6, 36: 0.06e-6}
 """To group words into lists, for each word x root of their number; done twice."""
-_RANGE_POINTS = 10_000
-"""Compared with every word, for the distances that scale votes."""
 
 WRITE_S_A_BYTE = 2.4e-9
 """To write features and their digest."""
@@ -74,27 +69,23 @@ MODELLED_BYTES_WITHIN = 1.1
 
 def assign_s(n_words: int, dimensions: int) -> float:
     """Seconds to find the nearest of `n_words` words of one descriptor, on the reference."""
-    if n_words <= _ONE_LIST_WORDS:
+    n_lists = n_lists_for(n_words)
+    if n_lists == 1:
         return n_words * _COMPARED_ALL_S[dimensions]
-    n_lists = _n_lists(n_words)
-    compared = n_lists + _PROBES_PER_ROOT_LIST * math.sqrt(n_lists) * n_words / n_lists
+    compared = n_lists + usual_probes(n_lists) * n_words / n_lists
     return compared * _COMPARED_LISTED_S[dimensions] + _LISTS_SORTED_S
 
 
 def train_s(n_points: int, n_words: int, dimensions: int) -> float:
     """Seconds to make words of so many points, on the reference."""
-    if n_points * n_words <= _FLAT_WORK:
+    if in_one_level(n_points, n_words):
         return n_points * n_words * _FLAT_PRODUCT_S[dimensions]
     root = math.sqrt(n_words)
     a_point = _LEVELS_POINT_S[dimensions] + root * _LEVELS_ROOT_WORD_S[dimensions]
     grouping = 2 * _GROUPING_S[dimensions] * n_words * root
-    return n_points * a_point + grouping + _RANGE_POINTS * n_words * _COMPARED_ALL_S[dimensions]
+    return n_points * a_point + grouping + DISTANCE_SAMPLE * n_words * _COMPARED_ALL_S[dimensions]
 
 
 def search_structure_bytes(n_words: int, dimensions: int) -> int:
     """Size of the saved search structure: bytes of its centres, 4 for each word, and headers."""
-    return _n_lists(n_words) * (dimensions + 8) + 4 * n_words + _HEADERS_BYTES
-
-
-def _n_lists(n_words: int) -> int:
-    return round(_LISTS_PER_ROOT_WORD * math.sqrt(n_words)) if n_words > _ONE_LIST_WORDS else 1
+    return n_lists_for(n_words) * (dimensions + 8) + 4 * n_words + _HEADERS_BYTES
