@@ -10,6 +10,8 @@ FlaneurError
 ├── VocabularyMismatch       postings or words of different codebooks were put together: exit 1
 ├── BrokerUnreachable        no server answers at the broker's address: exit 1
 ├── TaskFailed               a shard, channel or query could not be worked on; names it: exit 1
+├── Refused                  a worker does not do such work: other version, other roots: exit 1
+├── Cancelled                a person cancelled the job or batch: exit 1
 └── UnusableImage            one image cannot be used; caught where a reason is recorded
 """
 
@@ -52,6 +54,14 @@ class BrokerUnreachable(FlaneurError):
 
 class TaskFailed(FlaneurError):
     """A shard, channel or query could not be worked on; the message names it."""
+
+
+class Refused(FlaneurError):
+    """A worker does not take such work: it is of another version, or a path is not for it."""
+
+
+class Cancelled(FlaneurError):
+    """A person cancelled the job or the batch while it was at work."""
 
 
 class UnusableImage(FlaneurError):

@@ -6,9 +6,11 @@ from itertools import accumulate
 
 from contracts.errors import BadIndex, BadSurvey
 from contracts.progress import Progress
-from coordinator.follow import Follower, Order
+from coordinator.events import Order
+from coordinator.follow import Follower
 from index.jobs import JobFolder, JobPlan
 from retrieval.merging import word_ranges
+from workers.messages import job_message
 
 STAGES = ("extract", "train", "assign", "merge", "join")
 
@@ -27,8 +29,6 @@ def build(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress)
     """
     channels = plan.config.features.channels()
     shards = range(plan.n_shards)
-    where = {"index": str(job.root), "job": job.job}
-
     untrained = [name for name in channels if not job.valid_receipt("train", name)]
     if untrained and not plan.trains:
         raise BadIndex(
@@ -40,9 +40,9 @@ def build(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress)
     needed = list(shards) if untrained else unassigned
     missing = [n for n in needed if not job.valid_receipt("extract", f"{n:06d}")]
 
-    extracts = [Order("extract", f"{n:06d}", {**where, "shard": n}) for n in missing]
+    extracts = [Order("extract", f"{n:06d}", job_message(job, plan, shard=n)) for n in missing]
     _drain(_run(follower, progress, "extract", len(shards), extracts))
-    trains = [Order("train", name, {**where, "channel": name}) for name in untrained]
+    trains = [Order("train", name, job_message(job, plan, channel=name)) for name in untrained]
     indexed = [len(job.read_indexed(shard)) for shard in shards]
     if not any(indexed):
         raise NothingReadable(
@@ -55,7 +55,7 @@ def build(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress)
     # Ids are dense over the readable images: each shard begins where the former one ended.
     first_ids = [0, *accumulate(indexed)]
     assigns = [
-        Order("assign", f"{n:06d}", {**where, "shard": n, "first_image_id": first_ids[n]})
+        Order("assign", f"{n:06d}", job_message(job, plan, shard=n, first_image_id=first_ids[n]))
         for n in unassigned
     ]
     for order in _run(follower, progress, "assign", len(shards), assigns):
@@ -88,7 +88,6 @@ def merge(
     n_postings : by channel, or an upper bound. n_images : of the segment to be.
     afresh : what was merged before does not count.
     """
-    where = {"index": str(job.root), "job": job.job, "n_images": n_images}
     unjoined = [
         name
         for name in plan.config.features.channels()
@@ -100,10 +99,12 @@ def merge(
         ranges = word_ranges(_n_words(job, channel), n_postings[channel])
         for first, stop in ranges:
             key = f"{channel}.{first:07d}"
-            message = {**where, "channel": channel, "first_word": first, "stop_word": stop}
             if afresh or not job.valid_receipt("merge", key):
+                words = {"first_word": first, "stop_word": stop}
+                message = job_message(job, plan, channel=channel, n_images=n_images, **words)
                 merges.append(Order("merge", key, message))
-        message = {**where, "channel": channel, "first_words": [first for first, _ in ranges]}
+        pieces = [first for first, _ in ranges]
+        message = job_message(job, plan, channel=channel, n_images=n_images, first_words=pieces)
         joins.append(Order("join", channel, message))
     _drain(_run(follower, progress, "merge", len(merges), merges))
     _drain(_run(follower, progress, "join", len(plan.config.features.channels()), joins))

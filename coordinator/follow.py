@@ -14,7 +14,10 @@ from celery import Celery, states
 from redis import Redis, RedisError
 
 from contracts.errors import BadConfig, BadIndex, BrokerUnreachable, TaskFailed
-from workers.lease import EXPIRE_S, lease_key, starts_key
+from coordinator.events import Order
+from workers.lease import LEASE_S, lease_key, starts_key
+from workers.messages import Envelope, our_version
+from workers.roots import roots_here
 
 T = TypeVar("T")
 
@@ -22,15 +25,6 @@ POLL_S = 0.05
 LEASE_CHECK_S = 5.0
 OUTAGE_S = 60.0
 """How long a server may be away before the job gives up."""
-
-
-@dataclass(frozen=True, slots=True)
-class Order:
-    """One task to send. name : 'extract', … key : what it is about, for messages and ids."""
-
-    name: str
-    key: str
-    message: dict[str, Any]
 
 
 @dataclass(slots=True)
@@ -118,9 +112,14 @@ class Follower:
         # The result object is let go: it would listen, and we ask (a bounded number of keys).
         self._app.send_task(
             f"flaneur.{flight.order.name}",
-            args=[flight.order.message],
+            args=[self._envelope(flight.order).model_dump(mode="json")],
             task_id=flight.task_id,
             retry=False,
+        )
+
+    def _envelope(self, order: Order) -> Envelope:
+        return Envelope(
+            version=our_version(), lease_s=LEASE_S, roots=roots_here(), message=order.message
         )
 
     def _is_done(self, flight: _Flight) -> bool:
@@ -132,7 +131,7 @@ class Follower:
         self._patiently(partial(self._app.backend.forget, flight.task_id))
         value = meta["result"]
         if meta["status"] == states.SUCCESS:
-            return Outcome(flight.order, value, None)
+            return Outcome(flight.order, value["value"], None)
         wrong_index = value if isinstance(value, BadIndex | BadConfig) else None
         return Outcome(flight.order, None, f"{type(value).__name__}: {value}", wrong_index)
 
@@ -145,7 +144,7 @@ class Follower:
         for flight in flying:
             begun = self._server.exists(starts_key(flight.task_id))
             held = self._server.exists(lease_key(flight.task_id))
-            gone = begun and not held and now - flight.sent_at > EXPIRE_S
+            gone = begun and not held and now - flight.sent_at > LEASE_S
             if (gone or (restarted and not held)) and not self._is_done(flight):
                 self._send(flight)
                 flight.sent_at = now

@@ -7,7 +7,8 @@ from typing import Any, get_args
 
 from contracts.config import SearchConfig, Vote, Weight, Where
 from contracts.errors import TaskFailed
-from coordinator.follow import Follower, Order, Outcome
+from coordinator.events import Order
+from coordinator.follow import Follower, Outcome
 from coordinator.truth import JudgedQuery
 from geo.geojson import Feature, Kind, error_feature
 from index.opened import OpenedIndex

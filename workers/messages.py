@@ -1,13 +1,34 @@
 """What may stand in a message: ids and paths, checked before anything is done with them."""
 
+import json
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+)
 
 from contracts.config import SearchConfig, Vote, Weight
-from contracts.errors import TaskFailed
-from index.jobs import JobFolder
+from contracts.errors import Refused, TaskFailed
+from contracts.faults import first_fault
+from index.jobs import JobFolder, JobPlan
+from workers.roots import Roots
+
+MAX_MESSAGE_BYTES = 256 * 1024
+"""Of a message as JSON. Ids and paths need a few hundred; a polygon of a search is the longest."""
+
+
+@cache
+def our_version() -> str:
+    """The version of Flaneur that runs here."""
+    return version("flaneur")
 
 
 class Message(BaseModel):
@@ -16,38 +37,113 @@ class Message(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     @classmethod
-    def parse(cls, content: object) -> Self:
+    def parse(cls, content: object, roots: Roots | None = None) -> Self:
+        """Check a message. roots : where its paths are on this machine; None: they are ours.
+
+        Raises
+        ------
+        TaskFailed : it does not hold. Refused : a path in it is not for this worker.
+        """
         try:
-            return cls.model_validate(content)
+            return cls.model_validate(content, context=roots)
         except ValidationError as error:
+            where, what = first_fault(error)
             raise TaskFailed(
-                f"A message for {cls.__name__} does not hold ({error.errors()[0]['msg']}). "
+                f"A message for {cls.__name__} does not hold ({where}: {what}). "
                 "Are coordinator and workers of the same version?"
             ) from error
 
 
-class _JobMessage(Message):
-    index: str
+class Envelope(Message):
+    """What every message travels in: who sent it, and on what terms.
+
+    lease_s : how long a worker that is not heard of is believed to be at work.
+    roots : where the coordinator has each root, by name.
+    """
+
+    version: str
+    lease_s: Annotated[float, Field(gt=0, le=3600)]
+    roots: dict[str, str]
+    message: dict[str, Any]
+
+    @classmethod
+    def opened(cls, content: object) -> "Envelope":
+        """Check an envelope.
+
+        Raises
+        ------
+        TaskFailed : it is damaged or too large. Refused : it is of another version of Flaneur.
+        """
+        if isinstance(content, dict) and content.get("version") != our_version():
+            raise Refused(
+                f"this worker runs Flaneur {our_version()}, the coordinator "
+                f"{str(content.get('version'))[:20]}. Install the same version on both."
+            )
+        if len(json.dumps(content)) > MAX_MESSAGE_BYTES:
+            raise TaskFailed(f"A message is larger than {MAX_MESSAGE_BYTES} bytes.")
+        return cls.parse(content)
+
+
+def _localised(path: str, info: ValidationInfo) -> str:
+    return info.context.local(path) if isinstance(info.context, Roots) else path
+
+
+SharedPath = Annotated[str, AfterValidator(_localised)]
+"""A path as the coordinator names it; once parsed, where this machine has it."""
+
+
+class JobMessage(Message):
+    """Base of what is said of a job. config_digest : of the plan, as the coordinator sees it."""
+
+    index: SharedPath
     job: Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+    config_digest: str
 
     def folder(self) -> JobFolder:
-        return JobFolder(Path(self.index), self.job)
+        """The job's folder.
+
+        Raises
+        ------
+        Refused : this worker reads another configuration in its plan than the coordinator.
+        """
+        folder = JobFolder(Path(self.index), self.job)
+        digest = folder.read_plan().config.digest()
+        if digest != self.config_digest:
+            raise Refused(
+                f"this worker reads configuration {digest} in the plan of job {self.job}, the "
+                f"coordinator {self.config_digest[:16]}. Install the same version on both."
+            )
+        return folder
 
 
-class ExtractMessage(_JobMessage):
+def job_message(job: JobFolder, plan: JobPlan, **particulars: object) -> dict[str, object]:
+    """The message of one task of a job. particulars : the other fields of its class."""
+    digest = plan.config.digest()
+    return {"index": str(job.root), "job": job.job, "config_digest": digest, **particulars}
+
+
+class ExtractMessage(JobMessage):
     shard: Annotated[int, Field(ge=0)]
 
 
-class TrainMessage(_JobMessage):
+class ProbeMessage(JobMessage):
+    """Rows first_row to stop_row - 1 of a shard, to be extracted and thrown away."""
+
+    shard: Annotated[int, Field(ge=0)]
+    first_row: Annotated[int, Field(ge=0)]
+    stop_row: Annotated[int, Field(ge=0)]
+
+
+class TrainMessage(JobMessage):
     channel: str
 
 
-class AssignMessage(_JobMessage):
+class AssignMessage(JobMessage):
     shard: Annotated[int, Field(ge=0)]
     first_image_id: Annotated[int, Field(ge=0)]
 
 
-class MergeMessage(_JobMessage):
+class MergeMessage(JobMessage):
     """Words first_word to stop_word - 1. n_images : of the segment to be."""
 
     channel: str
@@ -56,7 +152,7 @@ class MergeMessage(_JobMessage):
     stop_word: Annotated[int, Field(ge=0)]
 
 
-class JoinMessage(_JobMessage):
+class JoinMessage(JobMessage):
     """`first_words` : of each range that was merged, ascending."""
 
     channel: str
@@ -70,10 +166,10 @@ class LocateMessage(Message):
     plain : search by the baseline, a bag of words, instead.
     """
 
-    index: str
+    index: SharedPath
     generation: int
     query: str
-    path: str
+    path: SharedPath
     search: SearchConfig
     plain: bool = False
 
@@ -98,7 +194,7 @@ class RehearseMessage(JudgeMessage):
     keep : a file where the votes of the single detectors by the search's own rule are left.
     """
 
-    keep: str | None = None
+    keep: SharedPath | None = None
     votes: tuple[Vote, ...]
     weightings: tuple[tuple[Weight, ...], ...]
     ks: tuple[int, ...]

@@ -12,9 +12,10 @@ import pytest
 from contracts.config import SearchConfig
 from contracts.errors import BadConfig, TaskFailed, WrongInput
 from coordinator import querying
+from coordinator.events import Order
 from coordinator.export.geojson import write_geojson
 from coordinator.export.results import refuse_unknown, refuse_unwritable, write_results
-from coordinator.follow import Follower, Order, Outcome
+from coordinator.follow import Follower, Outcome
 from coordinator.querying import Located, locate_photos
 from geo.geojson import Feature, PlacedMatch, error_feature, match_feature
 from index.opened import OpenedIndex

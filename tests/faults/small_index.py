@@ -19,7 +19,7 @@ from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, Where
 from coordinator.adding import plan_addition, run_addition
 from coordinator.compacting import compact
 from coordinator.engine import Engine
-from coordinator.follow import Order
+from coordinator.events import Order
 from coordinator.indexing import run_job
 from coordinator.intake import Intake, read_surveys
 from coordinator.plan import make_plan
@@ -75,7 +75,7 @@ class Here:
 def _do(name: str, message: dict[str, Any]) -> None:
     job, channel = JobFolder(Path(message["index"]), message["job"]), message.get("channel", "")
     if name == "extract":
-        extract_shard(job, message["shard"])
+        extract_shard(job, message["shard"], str)
     elif name == "train":
         train_channel(job, channel)
     elif name == "assign":

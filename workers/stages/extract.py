@@ -1,6 +1,8 @@
 """Extract: a shard's images, each decoded once, become one feature file."""
 
 import platform
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import faiss
@@ -21,15 +23,18 @@ def instruction_set() -> str:
     return f"{platform.machine()} {faiss.get_compile_options().strip()}"
 
 
-def extract_shard(job: JobFolder, shard: int) -> Receipt:
-    """Write the shard's features; an image that cannot be read is recorded and passed over."""
+def extract_shard(job: JobFolder, shard: int, local: Callable[[str], str]) -> Receipt:
+    """Write the shard's features; an image that cannot be read is recorded and passed over.
+
+    local : where this machine has a path of the plan.
+    """
     config = job.read_plan().config.features
     indexed: list[IndexedImage] = []
     skipped: list[Skipped] = []
     found: list[Features] = []
     for row, image in enumerate(job.read_images(shard)):
         try:
-            decoded, features = image_features(image, config)
+            decoded, features = image_features(_here(image, local), config)
         except UnusableImage as error:
             skipped.append(Skipped(image.uri, str(error)))
             continue
@@ -58,6 +63,11 @@ def extract_shard(job: JobFolder, shard: int) -> Receipt:
     )
     job.write_receipt(receipt)
     return receipt
+
+
+def _here(image: PosedImage, local: Callable[[str], str]) -> PosedImage:
+    mask = image.mask_path
+    return replace(image, path=local(image.path), mask_path=None if mask is None else local(mask))
 
 
 def image_features(image: PosedImage, config: FeatureConfig) -> tuple[DecodedImage, Features]:

@@ -1,0 +1,47 @@
+"""What happens to orders while they are followed: for whoever shows, logs or counts it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+Kind = Literal[
+    "sent",
+    "done",
+    "failed",
+    "lost",
+    "refused",
+    "given_up",
+    "paused",
+    "resumed",
+    "waiting",
+    "back",
+]
+"""lost : its worker was not heard of for too long, so it was sent again. given_up : it was begun
+too often. waiting : the broker is away; back : it is not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One task to send. name : 'extract', … key : what it is about, for messages and ids."""
+
+    name: str
+    key: str
+    message: dict[str, Any] = field(hash=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened. seconds : that a worker took. told : why, for people."""
+
+    kind: Kind
+    order: Order | None = None
+    worker: str = ""
+    seconds: float = 0.0
+    told: str = ""
+
+
+Listener = Callable[[Event], None]
+
+
+def unheard(_: Event) -> None:
+    """A listener for those who do not care."""
