@@ -9,7 +9,7 @@ COPY index index
 COPY survey survey
 COPY workers workers
 COPY coordinator coordinator
-RUN python -m venv /venv && /venv/bin/pip install --no-cache-dir --constraint constraints.txt .
+RUN python -m venv /venv && /venv/bin/pip install --no-cache-dir --constraint constraints.txt '.[s3]'
 
 FROM python:3.12-slim
 RUN useradd --create-home --uid 1000 flaneur \

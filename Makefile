@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PACKAGES := contracts geo retrieval index survey workers coordinator
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check faults bench clean
 
 demo: $(STAMP)  ## Render a small town, index it, locate old photos of it
 	$(BIN)/flaneur demo --out demo-out
@@ -19,6 +19,9 @@ check: $(STAMP)  ## What CI runs: format, lint, types, import direction, tests
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(MAKE) test
+
+faults: $(STAMP)  ## Throw faults at running jobs: each in each stage, then 100 random schedules
+	$(BIN)/python -m pytest tests/faults --faults
 
 bench: $(STAMP)  ## Figures on real images (FLANEUR_TEST_DATA), by hand
 	$(BIN)/python -m benchmarks

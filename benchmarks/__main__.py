@@ -16,13 +16,15 @@ from benchmarks import (
     pooled,
     poses,
     postings,
+    queue,
+    scaling,
     stereopolis,
-    workers,
 )
+from benchmarks.flow import run as flow
 from benchmarks.placing import run as placing
 from benchmarks.sets import run as sets
 
-FIGURES = {"stereopolis": stereopolis.run, "kth": kth.run, "workers": workers.run}
+FIGURES = {"stereopolis": stereopolis.run, "kth": kth.run}
 BENCHMARKS = {
     **FIGURES,
     "features": features.run,
@@ -37,6 +39,9 @@ BENCHMARKS = {
     "postings": postings.run,
     "index": index.run,
     "planned": planned.run,
+    "scaling": scaling.run,
+    "flow": flow.run,
+    "queue": queue.run,
 }
 
 

@@ -14,7 +14,7 @@ from coordinator.engine import running_engine
 from coordinator.evaluating import report_of
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
+from coordinator.plan import make_plan
 from coordinator.querying import judge_queries
 from coordinator.truth import read_truth
 from index.opened import OpenedIndex
@@ -40,7 +40,7 @@ def run(data: Path) -> None:
     with tempfile.TemporaryDirectory() as scratch, running_engine(None, None) as engine:
         root = Path(scratch)
         intake = read_surveys(sources, ReadOptions(no_pose=True))
-        job, plan = make_plan(root, intake, IndexConfig(), DEFAULT_SHARD_SIZE)
+        job, plan = make_plan(root, intake, IndexConfig())
         with bars() as progress:
             report = run_job(job, plan, intake, nullcontext(engine), progress)
         index = OpenedIndex(root)

@@ -26,7 +26,7 @@ from coordinator.demo import SHARD_SIZE as DEMO_SHARD_SIZE
 from coordinator.engine import running_engine
 from coordinator.indexing import IndexReport, run_job
 from coordinator.intake import read_surveys
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
+from coordinator.plan import SMALLEST_SHARD, make_plan
 from survey import ReadOptions
 from survey.synthetic import render_survey
 
@@ -147,7 +147,7 @@ def _cases(data: Path, town: Path) -> Sequence[Case]:
             (),
             ReadOptions(),
             IndexConfig(),
-            DEFAULT_SHARD_SIZE,
+            SMALLEST_SHARD,
         ),
         Case(
             "KTH, references",
@@ -155,7 +155,7 @@ def _cases(data: Path, town: Path) -> Sequence[Case]:
             ("--no-pose",),
             ReadOptions(no_pose=True),
             IndexConfig(),
-            DEFAULT_SHARD_SIZE,
+            SMALLEST_SHARD,
         ),
     )
 

@@ -37,15 +37,7 @@ from contracts.config import (
     Vote,
 )
 from contracts.records import PosedImage, Postings
-from retrieval.codebooks import (
-    Codebook,
-    SampleReservoir,
-    WordSearcher,
-    build_search,
-    n_words_for,
-    sample_keys,
-    train_codebook,
-)
+from retrieval.codebooks import Codebook, WordSearcher, build_search, n_words_for, train_codebook
 from retrieval.evaluation import average_precision
 from retrieval.fusion import ChannelQuery, Scores, full_ranking, fuse
 from retrieval.postings import (
@@ -54,6 +46,7 @@ from retrieval.postings import (
     inverse_document_frequency,
 )
 from retrieval.resampling import bootstrap_difference
+from retrieval.sampling import SampleReservoir, sample_keys
 from survey import ReadOptions, read_survey
 from workers.stages.extract import image_features
 

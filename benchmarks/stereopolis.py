@@ -20,7 +20,7 @@ from coordinator.cli.show import bars
 from coordinator.engine import Engine, running_engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
+from coordinator.plan import make_plan
 from coordinator.querying import Located, locate_photos
 from geo.crs import ToWgs84
 from geo.frames import LocalMetres
@@ -122,7 +122,7 @@ def index_first_pass(
 ) -> tuple[OpenedIndex, str, str]:
     """Index it; returns images per second and bytes per image too."""
     intake = read_surveys([("", survey)], options)
-    job, plan = make_plan(root, intake, config or IndexConfig(), DEFAULT_SHARD_SIZE // 4)
+    job, plan = make_plan(root, intake, config or IndexConfig())
     with bars() as progress:
         report = run_job(job, plan, intake, nullcontext(engine), progress)
     n_images = report.generation.n_images

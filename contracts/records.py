@@ -138,7 +138,8 @@ class Match:
 class Receipt:
     """Proof that one task of a job is done: what it wrote, and how much.
 
-    outputs : path relative to the index -> sha256. counts : totals to add up.
+    outputs : path relative to the index -> sha256. counts : totals to add up. made_from : a digest
+    of what else it depends on than the job, such as the words.
     """
 
     stage: str
@@ -147,3 +148,4 @@ class Receipt:
     counts: dict[str, int]
     skipped: tuple[Skipped, ...] = ()
     instruction_set: str = ""
+    made_from: str = ""

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from contracts.errors import BadConfig, BadIndex
+from contracts.places import Place
 from contracts.progress import Progress
 from contracts.records import PosedImage
 from coordinator.building import NothingReadable
@@ -38,7 +39,7 @@ class NewImages:
     n_known: int
 
 
-def find_new(index: OpenedIndex, name: str, path: Path, options: ReadOptions) -> NewImages:
+def find_new(index: OpenedIndex, name: str, path: Place, options: ReadOptions) -> NewImages:
     """Read a survey, in the coordinates of the index, and leave out what is live in the index.
 
     Raises
@@ -80,7 +81,9 @@ def before_replacing(job: JobFolder, plan: JobPlan, intake: Intake) -> str | Non
     return told
 
 
-def plan_addition(index: OpenedIndex, intake: Intake, shard_size: int) -> tuple[JobFolder, JobPlan]:
+def plan_addition(
+    index: OpenedIndex, intake: Intake, shard_size: int | None = None
+) -> tuple[JobFolder, JobPlan]:
     """Find or write the job that adds these images.
 
     Images that were added, removed and are added again need another job than the first time: its
@@ -134,14 +137,14 @@ def with_segment(writer: Writer, plan: JobPlan, intake: Intake, segment: Segment
     live = index.generation
     _refuse_changed(index, plan, intake, segment)
     crs = live.crs or intake.crs
-    there = np.column_stack([index.catalogue.numbers(name) for name in ("easting", "northing")])
+    places = [positions_of(each) for each in (index.catalogue, segment.catalogue)]
     return live.model_copy(
         update={
             "number": writer.next_number(),
             "made_by": plan.verb,
             "created_at": now(),
             "crs": crs,
-            "area": area_around(np.concatenate([there, positions_of(segment.rows)]), crs),
+            "area": area_around(np.concatenate(places), crs),
             "allow_ballpark": live.allow_ballpark or intake.allow_ballpark,
             "segments": (*live.segments, segment.entry),
             "files": {**live.files, **segment.files},
@@ -182,7 +185,7 @@ def _refuse_changed(index: OpenedIndex, plan: JobPlan, intake: Intake, segment: 
             f"{intake.crs}, {before}"
         )
     there = index.ids_by_uri()
-    twice = next((row.uri for row in segment.rows if row.uri in there), None)
+    twice = next((uri for uri in segment.catalogue.column("uri") if uri in there), None)
     if twice is not None:
         raise BadIndex(f"{index.root} was given {twice!r} (generation {live.number}) {before}")
 

@@ -1,18 +1,27 @@
-"""The stages of a job: what is missing of extract, train, assign, merge and join, in order."""
+"""The stages of a job: what is missing of extract, train, assign, merge and join, in order.
+
+An order is made when it is sent: a survey of millions of images has thousands of them.
+"""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import accumulate
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from contracts.errors import BadIndex, BadSurvey
 from contracts.progress import Progress
+from contracts.records import Receipt
 from coordinator.events import Order
-from coordinator.follow import Follower
+from coordinator.extracting import Shards, extract_missing
+from coordinator.flow import Outcome
+from coordinator.follow import Follower, value_of
 from index.jobs import JobFolder, JobPlan
 from retrieval.merging import word_ranges
 from workers.messages import job_message
 
 STAGES = ("extract", "train", "assign", "merge", "join")
+LONG_S = 6 * 3600.0
+"""After which a task is killed that reads much of a job: one of train, merge or join."""
+
+Orders = Iterable[Order | None]
 
 
 class NothingReadable(BadSurvey):
@@ -25,45 +34,30 @@ def build(job: JobFolder, plan: JobPlan, follower: Follower, progress: Progress)
     Raises
     ------
     NothingReadable : no image can be read. BadIndex : existing words are damaged.
-    TaskFailed : a task failed.
+    TaskFailed : a task failed. Cancelled : that was wished.
     """
     channels = plan.config.features.channels()
-    shards = range(plan.n_shards)
     untrained = [name for name in channels if not job.valid_receipt("train", name)]
     if untrained and not plan.trains:
         raise BadIndex(
             f"The words of {untrained[0]} in {job.root / 'codebooks' / plan.codebooks} are not "
             "what they were. Restore them, or index again."
         )
-    unassigned = [n for n in shards if untrained or not job.valid_receipt("assign", f"{n:06d}")]
+    shards = Shards.unknown(plan.n_shards)
     # The features of an assigned shard are gone; they are needed again only to train.
-    needed = list(shards) if untrained else unassigned
-    missing = [n for n in needed if not job.valid_receipt("extract", f"{n:06d}")]
-
-    extracts = [Order("extract", f"{n:06d}", job_message(job, plan, shard=n)) for n in missing]
-    _drain(_run(follower, progress, "extract", len(shards), extracts))
-    trains = [Order("train", name, job_message(job, plan, channel=name)) for name in untrained]
-    indexed = [len(job.read_indexed(shard)) for shard in shards]
-    if not any(indexed):
+    words = "" if untrained else job.words_digest(channels)
+    extracted = extract_missing(job, plan, shards, words, follower, progress)
+    if not shards.n_images.any():
         raise NothingReadable(
             f"Not one of the {plan.n_images} images can be read; see {job.path / 'receipts'}. "
             "Check the survey's files."
         )
     if plan.trains:
-        _drain(_run(follower, progress, "train", len(channels), trains))
-
-    # Ids are dense over the readable images: each shard begins where the former one ended.
-    first_ids = [0, *accumulate(indexed)]
-    assigns = [
-        Order("assign", f"{n:06d}", job_message(job, plan, shard=n, first_image_id=first_ids[n]))
-        for n in unassigned
-    ]
-    for order in _run(follower, progress, "assign", len(shards), assigns):
-        job.features(int(order.key)).unlink(missing_ok=True)
-    assigned = assigned_counts(job, plan)
-    points = {name: assigned[f"{name}/points"] for name in channels}
-    merge(job, plan, points, sum(indexed), follower, progress, bool(unassigned))
-    return sum(indexed[shard] for shard in missing)
+        _train(job, plan, untrained, follower, progress)
+    counts, anew = _assign(job, plan, shards, follower, progress)
+    points = {name: counts[f"{name}/points"] for name in channels}
+    merge(job, plan, points, int(shards.n_images.sum()), follower, progress, anew)
+    return extracted
 
 
 def is_built(job: JobFolder, plan: JobPlan) -> bool:
@@ -72,6 +66,47 @@ def is_built(job: JobFolder, plan: JobPlan) -> bool:
         job.valid_receipt("train", name) and job.valid_receipt("join", name)
         for name in plan.config.features.channels()
     )
+
+
+def _train(
+    job: JobFolder,
+    plan: JobPlan,
+    untrained: Sequence[str],
+    follower: Follower,
+    progress: Progress,
+) -> None:
+    n_channels = len(plan.config.features.channels())
+    progress.begin("train", n_channels, n_channels - len(untrained))
+    orders = (
+        Order("train", name, job_message(job, plan, channel=name), LONG_S) for name in untrained
+    )
+    for _ in _done(follower, orders, progress, "train"):
+        pass
+
+
+def _assign(
+    job: JobFolder, plan: JobPlan, shards: Shards, follower: Follower, progress: Progress
+) -> tuple[Counter[str], bool]:
+    """Assign what is not; returns what was counted in all shards, and whether any was missing."""
+    counts: Counter[str] = Counter()
+    first_ids = shards.first_ids()
+
+    def orders() -> Iterator[Order | None]:
+        for shard in range(plan.n_shards):
+            if shards.is_assigned(shard):
+                counts.update(_receipt(job, "assign", f"{shard:06d}").counts)
+                progress.advance("assign")
+                yield None
+            else:
+                first_id = int(first_ids[shard])
+                message = job_message(job, plan, shard=shard, first_image_id=first_id)
+                yield Order("assign", f"{shard:06d}", message)
+
+    progress.begin("assign", plan.n_shards, 0)
+    for outcome in _done(follower, orders(), progress, "assign"):
+        counts.update(value_of(outcome)["counts"])
+        job.features(int(outcome.order.key)).unlink(missing_ok=True)
+    return counts, not shards.all_assigned
 
 
 def merge(
@@ -88,36 +123,53 @@ def merge(
     n_postings : by channel, or an upper bound. n_images : of the segment to be.
     afresh : what was merged before does not count.
     """
-    unjoined = [
-        name
-        for name in plan.config.features.channels()
-        if afresh or not job.valid_receipt("join", name)
-    ]
-    merges: list[Order] = []
-    joins: list[Order] = []
-    for channel in unjoined:
-        ranges = word_ranges(_n_words(job, channel), n_postings[channel])
-        for first, stop in ranges:
-            key = f"{channel}.{first:07d}"
-            if afresh or not job.valid_receipt("merge", key):
+    channels = plan.config.features.channels()
+    unjoined = [name for name in channels if afresh or not job.valid_receipt("join", name)]
+    ranges = {
+        name: word_ranges(_receipt(job, "train", name).counts["words"], n_postings[name])
+        for name in unjoined
+    }
+
+    def merges() -> Iterator[Order | None]:
+        for channel, of_channel in ranges.items():
+            for first, stop in of_channel:
+                key = f"{channel}.{first:07d}"
+                if not afresh and job.valid_receipt("merge", key):
+                    progress.advance("merge")
+                    yield None
+                    continue
                 words = {"first_word": first, "stop_word": stop}
                 message = job_message(job, plan, channel=channel, n_images=n_images, **words)
-                merges.append(Order("merge", key, message))
-        pieces = [first for first, _ in ranges]
-        message = job_message(job, plan, channel=channel, n_images=n_images, first_words=pieces)
-        joins.append(Order("join", channel, message))
-    _drain(_run(follower, progress, "merge", len(merges), merges))
-    _drain(_run(follower, progress, "join", len(plan.config.features.channels()), joins))
+                yield Order("merge", key, message, LONG_S)
+
+    progress.begin("merge", sum(map(len, ranges.values())), 0)
+    for _ in _done(follower, merges(), progress, "merge"):
+        pass
+    joins = (
+        Order(
+            "join",
+            channel,
+            job_message(
+                job,
+                plan,
+                channel=channel,
+                n_images=n_images,
+                first_words=[first for first, _ in of_channel],
+            ),
+            LONG_S,
+        )
+        for channel, of_channel in ranges.items()
+    )
+    progress.begin("join", len(channels), len(channels) - len(unjoined))
+    for _ in _done(follower, joins, progress, "join"):
+        pass
 
 
 def assigned_counts(job: JobFolder, plan: JobPlan) -> Counter[str]:
     """What assigning counted in all shards: for each channel `/points` and `/sq_dist`."""
     counts: Counter[str] = Counter()
     for shard in range(plan.n_shards):
-        receipt = job.read_receipt("assign", f"{shard:06d}")
-        if receipt is None:
-            raise BadIndex(f"{job.path} lacks the receipt of shard {shard}. Run it again.")
-        counts.update(receipt.counts)
+        counts.update(_receipt(job, "assign", f"{shard:06d}").counts)
     return counts
 
 
@@ -130,22 +182,15 @@ def quantisation_of(job: JobFolder, plan: JobPlan) -> dict[str, float]:
     }
 
 
-def _run(
-    follower: Follower, progress: Progress, stage: str, total: int, orders: list[Order]
-) -> Iterator[Order]:
-    progress.begin(stage, total, total - len(orders))
-    for order, _ in follower.results(orders):
+def _done(follower: Follower, orders: Orders, progress: Progress, stage: str) -> Iterator[Outcome]:
+    for outcome in follower.outcomes(orders):
+        value_of(outcome)
         progress.advance(stage)
-        yield order
+        yield outcome
 
 
-def _drain(orders: Iterable[Order]) -> None:
-    for _ in orders:
-        pass
-
-
-def _n_words(job: JobFolder, channel: str) -> int:
-    trained = job.read_receipt("train", channel)
-    if trained is None:
-        raise BadIndex(f"{job.path} lacks the receipt of {channel}'s words. Run it again.")
-    return trained.counts["words"]
+def _receipt(job: JobFolder, stage: str, key: str) -> Receipt:
+    receipt = job.awaited_receipt(stage, key)
+    if receipt is None:
+        raise BadIndex(f"{job.path} lacks the receipt of {stage} {key}. Run it again.")
+    return receipt

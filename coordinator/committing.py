@@ -1,8 +1,7 @@
 """What a finished job adds to an index: its segment, its catalogue, and the generation's files."""
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from contracts.records import Receipt, Skipped
 from coordinator.building import quantisation_of
 from coordinator.intake import Intake
 from geo.crs import area_of
-from index.catalogue import CatalogueRow, catalogue_row, write_catalogue
+from index.catalogue import Catalogue, CatalogueRow, catalogue_row, write_catalogue
 from index.codebooks import codebooks_digest
 from index.jobs import JobFolder, JobPlan
 from index.manifest import FileEntry, SegmentEntry, SurveyEntry
@@ -24,13 +23,13 @@ Area = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A segment that is ready. rows : its images.
+    """A segment that is ready. catalogue : its images.
 
     files : its own. codebook_files : of the words that it was assigned to.
     """
 
     entry: SegmentEntry
-    rows: tuple[CatalogueRow, ...]
+    catalogue: Catalogue
     files: dict[str, FileEntry]
     codebook_files: dict[str, FileEntry]
     codebooks_digest: str
@@ -43,10 +42,21 @@ def finish_segment(job: JobFolder, plan: JobPlan, intake: Intake) -> Segment:
     ------
     BadIndex : files of the job changed meanwhile.
     """
-    rows = _rows(job, plan, intake)
-    skipped = all_skipped(intake, extract_receipts(job, plan))
+    receipts = extract_receipts(job, plan)
+    skipped = all_skipped(intake, receipts)
     job.write_skipped([{"uri": each.uri, "reason": each.reason} for each in skipped])
-    of_survey = Counter(row.survey for row in rows)
+    n_images = sum(receipt.counts["images"] for receipt in receipts)
+    entry = SegmentEntry(
+        name=plan.segment,
+        jobs=(job.job,),
+        n_images=n_images,
+        n_postings=0,
+        n_skipped=len(skipped),
+        surveys=(),
+        quantisation=quantisation_of(job, plan),
+    )
+    segment = segment_of(job, plan, entry, _rows(job, plan, intake), intake.crs)
+    of_survey = segment.catalogue.counts("survey")
     surveys = tuple(
         SurveyEntry(
             name=named.name,
@@ -57,32 +67,26 @@ def finish_segment(job: JobFolder, plan: JobPlan, intake: Intake) -> Segment:
         )
         for named in intake.surveys
     )
-    entry = SegmentEntry(
-        name=plan.segment,
-        jobs=(job.job,),
-        n_images=len(rows),
-        n_postings=0,
-        n_skipped=len(skipped),
-        surveys=surveys,
-        quantisation=quantisation_of(job, plan),
-    )
-    return segment_of(job, plan, entry, rows, intake.crs)
+    return replace(segment, entry=segment.entry.model_copy(update={"surveys": surveys}))
 
 
 def segment_of(
     job: JobFolder,
     plan: JobPlan,
     entry: SegmentEntry,
-    rows: Sequence[CatalogueRow],
+    rows: Iterable[CatalogueRow],
     crs: str | None,
 ) -> Segment:
     """Write a segment's catalogue and gather its files; `entry` is given its postings.
+
+    rows : of the images that `entry` counts.
 
     Raises
     ------
     BadIndex : files of the job changed meanwhile.
     """
     outputs = _catalogue_outputs(job, plan, rows, crs)
+    path = job.root / next(iter(outputs))
     words: dict[str, str] = {}
     codebooks: dict[str, str] = {}
     n_postings = 0
@@ -96,7 +100,7 @@ def segment_of(
         )
     return Segment(
         entry=entry.model_copy(update={"n_postings": n_postings}),
-        rows=tuple(rows),
+        catalogue=Catalogue([path], [entry.n_images]),
         files=file_entries(job.root, outputs),
         codebook_files=file_entries(job.root, codebooks),
         codebooks_digest=codebooks_digest(words),
@@ -104,14 +108,14 @@ def segment_of(
 
 
 def _catalogue_outputs(
-    job: JobFolder, plan: JobPlan, rows: Sequence[CatalogueRow], crs: str | None
+    job: JobFolder, plan: JobPlan, rows: Iterable[CatalogueRow], crs: str | None
 ) -> dict[str, str]:
     """Write the catalogue, but not again: earlier generations may name the one that is there."""
     receipt = job.valid_receipt("catalogue", plan.segment)
     if receipt is None:
         path = job.root / "catalogue" / f"{plan.segment}.parquet"
         outputs = {job.relative(path): write_catalogue(path, rows, crs)}
-        receipt = Receipt("catalogue", plan.segment, outputs, {"images": len(rows)})
+        receipt = Receipt("catalogue", plan.segment, outputs, {})
         job.write_receipt(receipt)
     return receipt.outputs
 
@@ -127,10 +131,9 @@ def area_around(positions: NDArray[np.float64], crs: str | None) -> Area | None:
     return area.west_lon_degree, area.south_lat_degree, area.east_lon_degree, area.north_lat_degree
 
 
-def positions_of(rows: Sequence[CatalogueRow]) -> NDArray[np.float64]:
+def positions_of(catalogue: Catalogue) -> NDArray[np.float64]:
     """Easting and northing of each image; (n, 2), NaN where it has no pose."""
-    places = [(row.easting, row.northing) for row in rows]
-    return np.array(places, dtype=np.float64).reshape(-1, 2)
+    return np.column_stack([catalogue.numbers(name) for name in ("easting", "northing")])
 
 
 def now() -> str:
@@ -150,22 +153,21 @@ def all_skipped(intake: Intake, receipts: Sequence[Receipt]) -> tuple[Skipped, .
     return tuple(sorted((*intake.skipped, *unreadable), key=lambda skipped: skipped.uri.encode()))
 
 
-def _rows(job: JobFolder, plan: JobPlan, intake: Intake) -> list[CatalogueRow]:
-    rows: list[CatalogueRow] = []
+def _rows(job: JobFolder, plan: JobPlan, intake: Intake) -> Iterator[CatalogueRow]:
+    """The images that could be read, a shard at a time."""
+    n_rows = 0
     for shard in range(plan.n_shards):
+        images = job.read_images(shard)
         for indexed in job.read_indexed(shard):
-            position = shard * plan.shard_size + indexed.row
-            rows.append(
-                catalogue_row(
-                    len(rows),
-                    intake.survey_names[position],
-                    intake.images[position],
-                    indexed.sha256,
-                    indexed.width_px,
-                    indexed.height_px,
-                )
+            yield catalogue_row(
+                n_rows,
+                intake.survey_names[shard * plan.shard_size + indexed.row],
+                images[indexed.row],
+                indexed.sha256,
+                indexed.width_px,
+                indexed.height_px,
             )
-    return rows
+            n_rows += 1
 
 
 def _valid(job: JobFolder, stage: str, channel: str) -> Receipt:

@@ -16,9 +16,11 @@ from coordinator.building import is_built, merge
 from coordinator.committing import area_around, now, positions_of, segment_of
 from coordinator.engine import Engine
 from coordinator.plan import free_segment, job_id, write_train_receipts
+from coordinator.watching.watch import watching
 from index.catalogue import CatalogueRow
 from index.codebooks import words_of_generation
 from index.commits import is_worked_on, working, writing
+from index.control import begin_again
 from index.files import write_array
 from index.jobs import JobFolder, JobPlan
 from index.manifest import Generation, SegmentEntry, read_generation
@@ -27,8 +29,12 @@ from index.opened import OpenedIndex
 
 @dataclass(frozen=True, slots=True)
 class CompactReport:
-    """What compacting did. before : the generation that was compacted."""
+    """What compacting did. job : that did it; None: there was nothing to do.
 
+    before : the generation that was compacted.
+    """
+
+    job: JobFolder | None
     before: Generation
     generation: Generation
     seconds: float
@@ -55,9 +61,10 @@ def compact(
     index = OpenedIndex(root)
     live = index.generation
     if is_compact(live):
-        return CompactReport(live, live, 0.0)
+        return CompactReport(None, live, live, 0.0)
     job, plan = _plan(index)
-    with working(job):
+    with working(job), watching(job, plan, progress) as watch:
+        begin_again(job.path)
         order = _order(index)
         if not is_built(job, plan):
             _write_new_ids(job, index, order)
@@ -66,11 +73,12 @@ def compact(
                 for name in live.config.features.channels()
             }
             with engine as running:
-                merge(job, plan, sizes, index.n_live, running.follower, progress, False)
-        generation = _commit(job, plan, index, order)
+                merge(job, plan, sizes, index.n_live, watch.followed(running), watch, False)
+        with watch.at("commit"):
+            generation = _commit(job, plan, index, order)
     if not is_worked_on(job):
         job.drop_scratch()
-    return CompactReport(live, generation, time.perf_counter() - started)
+    return CompactReport(job, live, generation, time.perf_counter() - started)
 
 
 def _plan(index: OpenedIndex) -> tuple[JobFolder, JobPlan]:
@@ -134,7 +142,7 @@ def _commit(
                 "number": writer.next_number(),
                 "made_by": plan.verb,
                 "created_at": now(),
-                "area": area_around(positions_of(rows), live.crs),
+                "area": area_around(positions_of(segment.catalogue), live.crs),
                 "segments": (segment.entry,),
                 "files": {**segment.files, **segment.codebook_files},
             }

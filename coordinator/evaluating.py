@@ -140,7 +140,7 @@ class _Pictures:
                     hit=None if each["junk"] else each["hit"],
                 )
             )
-        photo = _picture(lambda: thumbnail_jpeg(query.path, PHOTO_PX, box=query.box))
+        photo = _picture(lambda: thumbnail_jpeg(str(query.path), PHOTO_PX, box=query.box))
         return JudgedSheet(_RESULT.validate_python(answer), photo, tuple(matches))
 
     def _of(self, row: CatalogueRow) -> bytes | None:

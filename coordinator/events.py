@@ -22,22 +22,30 @@ too often. waiting : the broker is away; back : it is not."""
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One task to send. name : 'extract', … key : what it is about, for messages and ids."""
+    """One task to send. name : 'extract', … key : what it is about, for messages and ids.
+
+    limit_s : its process is killed after that long.
+    """
 
     name: str
     key: str
     message: dict[str, Any] = field(hash=False)
+    limit_s: float = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened. seconds : that a worker took. told : why, for people."""
+    """Something that happened. seconds : that a worker took. told : why, for people.
+
+    value : what a task that is done returned.
+    """
 
     kind: Kind
     order: Order | None = None
     worker: str = ""
     seconds: float = 0.0
     told: str = ""
+    value: dict[str, Any] | None = None
 
 
 Listener = Callable[[Event], None]

@@ -21,7 +21,9 @@ from coordinator.committing import (
 )
 from coordinator.engine import Engine
 from coordinator.intake import Intake
+from coordinator.watching.watch import watching
 from index.commits import Writer, is_worked_on, working, writing
+from index.control import begin_again
 from index.files import check_files
 from index.jobs import JobFolder, JobPlan
 from index.manifest import Generation, read_generation
@@ -96,11 +98,13 @@ def run_and_commit(
     generation = find_finished(job)
     extracted = 0
     if generation is None:
-        with working(job):
+        with working(job), watching(job, plan, progress) as watch:
+            begin_again(job.path)
             if not is_built(job, plan):
                 with engine as running:
-                    extracted = build(job, plan, running.follower, progress)
-            generation = _commit(job, plan, intake, assemble)
+                    extracted = build(job, plan, watch.followed(running), watch)
+            with watch.at("commit"):
+                generation = _commit(job, plan, intake, assemble)
     if not is_worked_on(job):  # by the same command, run twice at once
         job.drop_scratch()
     return report_of_job(job, plan, intake, generation, extracted, started)
@@ -115,7 +119,7 @@ def whole_index(writer: Writer, plan: JobPlan, intake: Intake, segment: Segment)
         config=plan.config,
         config_digest=plan.config_digest,
         crs=intake.crs,
-        area=area_around(positions_of(segment.rows), intake.crs),
+        area=area_around(positions_of(segment.catalogue), intake.crs),
         allow_ballpark=intake.allow_ballpark,
         codebooks=plan.codebooks,
         codebooks_digest=segment.codebooks_digest,

@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 
 from contracts.errors import BadConfig, BadSurvey
+from contracts.places import Place
 from contracts.records import PosedImage, Skipped
 from geo.reprojection import reproject
 from survey import ReadOptions, Survey, read_survey
@@ -17,7 +17,7 @@ class NamedSurvey:
     """A survey as the command line names it; the main one has the name ''."""
 
     name: str
-    path: Path
+    path: Place
     survey: Survey
 
 
@@ -34,9 +34,16 @@ class Intake:
     notes: tuple[str, ...]
     allow_ballpark: bool
 
+    def without_images(self) -> "Intake":
+        """The same, without what the shards of a job have by now: a kilobyte an image."""
+        surveys = (
+            replace(named, survey=replace(named.survey, images=())) for named in self.surveys
+        )
+        return replace(self, surveys=tuple(surveys), images=())
+
 
 def read_surveys(
-    sources: Sequence[tuple[str, Path]], options: ReadOptions, crs: str | None = None
+    sources: Sequence[tuple[str, Place]], options: ReadOptions, crs: str | None = None
 ) -> Intake:
     """Read every survey; `sources` are (name, path), the main survey's name is ''.
 

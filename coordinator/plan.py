@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 
 from contracts.config import IndexConfig
@@ -11,16 +12,26 @@ from coordinator.intake import Intake
 from index.codebooks import Words
 from index.commits import writing
 from index.jobs import JobFolder, JobPlan, Verb, jobs_of
+from survey.stored import forget_listings, state_of
 
-DEFAULT_SHARD_SIZE = 32
-"""Images a shard: half a minute of one core, so that a lost worker costs little."""
+SMALLEST_SHARD = 8
+"""Images: seconds of one core, still many times what sending a task and its files cost."""
+LARGEST_SHARD = 128
+"""Two minutes of one core, so that a lost worker costs little, and 0.4 GB of its memory."""
+MANY_SHARDS = 8192
+"""Beyond so many, shards grow instead: merging opens each of them for every range of words."""
 
 
 def make_plan(
-    root: Path, intake: Intake, config: IndexConfig, shard_size: int, words: Words | None = None
+    root: Path,
+    intake: Intake,
+    config: IndexConfig,
+    shard_size: int | None = None,
+    words: Words | None = None,
 ) -> tuple[JobFolder, JobPlan]:
     """Find or write the job that makes an index of these images by this configuration.
 
+    shard_size : None: by the number of images.
     words : already in the index, to be used instead of training some.
 
     Raises
@@ -36,7 +47,7 @@ def plan_images(
     verb: Verb,
     images: Sequence[PosedImage],
     config: IndexConfig,
-    shard_size: int,
+    shard_size: int | None,
     words: Words | None,
     again: int = 0,
 ) -> tuple[JobFolder, JobPlan]:
@@ -49,12 +60,13 @@ def plan_images(
     again : tells jobs apart that are alike in all this.
     """
     told = (verb, str(again), config.digest(), words.digest if words else "")
-    job = JobFolder(root, job_id((*told, *_states(images))))
+    job = JobFolder(root, job_id(chain(told, _states(images))))
+    forget_listings()
     with writing(root):  # or two jobs begun at once would take the same segment
         if job.has_plan():
             return job, job.read_plan()
-        shards = [images[at : at + shard_size] for at in range(0, len(images), shard_size)]
         segment = free_segment(root)
+        size = shard_size or shard_size_for(len(images))
         plan = JobPlan(
             job=job.job,
             verb=verb,
@@ -64,13 +76,20 @@ def plan_images(
             codebooks=words.name if words else segment,
             trains=words is None,
             n_images=len(images),
-            shard_size=shard_size,
-            n_shards=len(shards),
+            shard_size=size,
+            n_shards=-(-len(images) // size),
         )
         if words is not None:
             write_train_receipts(job, words)
-        job.write_plan(plan, shards)
+        firsts = range(0, len(images), size)
+        job.write_plan(plan, (images[first : first + size] for first in firsts))
     return job, plan
+
+
+def shard_size_for(n_images: int) -> int:
+    """Images a shard where nobody says otherwise; the finished index does not depend on it."""
+    wanted = max(-(-n_images // MANY_SHARDS), SMALLEST_SHARD)
+    return min(1 << (wanted - 1).bit_length(), LARGEST_SHARD)
 
 
 def job_id(parts: Iterable[str]) -> str:
@@ -97,10 +116,10 @@ def free_segment(root: Path) -> str:
 
 def _states(images: Sequence[PosedImage]) -> Iterable[str]:
     # Many images may lie in one file.
-    states = {path: Path(path).stat() for path in {image.path for image in images}}
+    states = {path: state_of(path) for path in {image.path for image in images}}
     for image in images:
         state = states[image.path]
-        yield f"{image!r} {state.st_size} {state.st_mtime_ns}"
+        yield f"{image!r} {state.size} {state.mark}"
 
 
 def _refuse_foreign(root: Path) -> None:

@@ -5,6 +5,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from coordinator.batches.batch import BATCHES
+from coordinator.batches.states import pinned_generations
 from index.commits import is_worked_on, writing
 from index.inventory import sizes_on_disk, unneeded
 from index.jobs import JobPlan, jobs_of
@@ -29,8 +31,9 @@ class Pruned:
 def prune(root: Path) -> Pruned:
     """Delete the generations before the live one, and every file that no other one needs.
 
-    Jobs that a process works on stay; unfinished ones that nobody works on go. Files in the
-    folder that are none of the index's stay. Generations go first: killed half-way, what is left
+    Jobs that a process works on stay; unfinished ones that nobody works on go. A generation that
+    an unfinished batch of the index is located against stays. Files in the folder that are none of
+    the index's stay, batches among them. Generations go first: killed half-way, what is left
     is files that nobody names, and the next time takes them.
 
     Raises
@@ -39,11 +42,12 @@ def prune(root: Path) -> Pruned:
     """
     live_number(root)  # or a lock would be made in what is no index
     with writing(root):
-        live = live_number(root)
+        pinned, live = pinned_generations(root / BATCHES), live_number(root)
         numbers = generation_numbers(root)
-        kept = [read_generation(root, number) for number in numbers if number >= live]
+        kept_numbers = [each for each in numbers if each >= live or each in pinned]
+        kept = [read_generation(root, number) for number in kept_numbers]
         spare = unneeded(sizes_on_disk(root), kept, _at_work(root, kept))
-        former = tuple(number for number in numbers if number < live)
+        former = tuple(number for number in numbers if number not in kept_numbers)
         for number in former:
             generation_path(root, number).unlink()
         for name in sorted(spare):

@@ -7,8 +7,12 @@ from typing import Any, get_args
 
 from contracts.config import SearchConfig, Vote, Weight, Where
 from contracts.errors import TaskFailed
+from contracts.places import Place
+from coordinator.batches.photos import Photo, photo_file
 from coordinator.events import Order
-from coordinator.follow import Follower, Outcome
+from coordinator.flow import Outcome
+from coordinator.follow import Follower
+from coordinator.holding import HeldAnswers
 from coordinator.truth import JudgedQuery
 from geo.geojson import Feature, Kind, error_feature
 from index.opened import OpenedIndex
@@ -24,10 +28,6 @@ WEIGHTINGS: tuple[tuple[Weight, ...], ...] = (
     ("burst", "idf", "norm"),
 )
 """Sets of weights that an evaluation compares."""
-
-WINDOW = 1000
-"""Photos sent before the first of them must be answered. Workers wait for one another once a
-window: a photo's time in a thousand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,53 +93,65 @@ def searched(index: OpenedIndex, where: Where) -> Json:
 
 def locate_photos(
     index: OpenedIndex,
-    photos: Sequence[str],
+    photos: Sequence[str | Photo],
     search: SearchConfig,
     follower: Follower,
     advance: Callable[[], None],
     *,
     plain: bool = False,
 ) -> Iterator[Located]:
-    """Locate photos as a batch, in the order given, each handed on as soon as it can be.
+    """Locate photos in the order given, each handed on as soon as it can be.
 
     One that fails becomes an error feature and stops no other. Nothing is sent before the first
-    answer is asked for. Answers that come before their turn are held: those of a window, so that
-    memory does not grow with the batch.
+    answer is asked for. Answers that come before their turn are held (`HeldAnswers`).
 
-    plain : by the baseline, a bag of words.
+    photos : by the names of their files, or with another name. plain : by the baseline, a bag of
+    words.
 
     Raises
     ------
     BadIndex, BadConfig : as a worker found, and so for every photo.
     """
-    for begin in range(0, len(photos), WINDOW):
-        window = range(begin, min(begin + WINDOW, len(photos)))
-        orders = (
-            Order(
-                "locate",
-                str(number),
-                {**_message(index, photos[number], Path(photos[number]), search), "plain": plain},
-            )
-            for number in window
-        )
-        held: dict[int, Located] = {}
-        turns = iter(window)
-        turn = next(turns)
-        for outcome in follower.outcomes(orders):
-            number = int(outcome.order.key)
-            held[number] = _located(photos[number], outcome)
-            advance()
-            while turn in held:
-                yield held.pop(turn)
-                turn = next(turns, -1)
+    asked = [photo_file(each) if isinstance(each, str) else each for each in photos]
+    orders = (
+        Order("locate", str(number), locate_message(index, photo, search, plain=plain))
+        for number, photo in enumerate(asked)
+        if not photo.error
+    )
+    outcomes = follower.outcomes(orders)
+    with HeldAnswers() as held:
+        for turn, photo in enumerate(asked):
+            if photo.error:
+                advance()
+                yield Located(photo.query, (error_feature(photo.query, photo.error),), 0.0)
+                continue
+            while turn not in held:
+                outcome = next(outcomes)
+                number = int(outcome.order.key)
+                held.put(number, *answer_of(asked[number].query, outcome))
+                advance()
+            yield Located(photo.query, *held.take(turn))
 
 
-def _located(query: str, outcome: Outcome) -> Located:
+def answer_of(query: str, outcome: Outcome) -> tuple[tuple[Feature, ...], float]:
+    """The features that an outcome says of a photo, and the seconds a worker took.
+
+    Raises
+    ------
+    BadIndex, BadConfig : as the worker found.
+    """
     if outcome.wrong_index is not None:
         raise outcome.wrong_index
     if outcome.value is None:
-        return Located(query, (error_feature(query, str(outcome.error)),), 0.0)
-    return Located(query, tuple(outcome.value["features"]), outcome.value["seconds"])
+        return (error_feature(query, str(outcome.error)),), 0.0
+    return tuple(outcome.value["features"]), outcome.value["seconds"]
+
+
+def locate_message(
+    index: OpenedIndex, photo: Photo, search: SearchConfig | Path, *, plain: bool = False
+) -> Json:
+    """What a worker is told of a photo. search : or the file that holds it."""
+    return {**_message(index, photo.query, Path(photo.path), search), "plain": plain}
 
 
 def judge_queries(
@@ -217,11 +229,11 @@ def _judged_message(index: OpenedIndex, query: JudgedQuery, search: SearchConfig
     }
 
 
-def _message(index: OpenedIndex, query: str, path: Path, search: SearchConfig) -> Json:
+def _message(index: OpenedIndex, query: str, path: Place, search: SearchConfig | Path) -> Json:
     return {
-        "index": str(index.root),
+        "index": index.place,
         "generation": index.generation.number,
         "query": query,
         "path": str(path.absolute()),
-        "search": search.model_dump(mode="json"),
+        "search": str(search) if isinstance(search, Path) else search.model_dump(mode="json"),
     }

@@ -5,6 +5,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from contracts.errors import BadIndex
+from coordinator.batches.batch import BATCHES
+from coordinator.batches.states import pinned_generations
 from coordinator.building import STAGES
 from coordinator.index_state import (
     CodebookState,
@@ -60,7 +62,7 @@ def state_of(root: Path) -> IndexState:
         codebooks=() if live is None else _codebooks(root, live),
         jobs=tuple(_job(job, plan, fault) for job, plan, fault in jobs),
         bytes=sum(sizes.values()),
-        bytes_unneeded=0 if live is None else _unneeded(sizes, live, generations, jobs),
+        bytes_unneeded=0 if live is None else _unneeded(root, sizes, live, generations, jobs),
         instruction_sets=() if live is None else _instruction_sets(root, live),
         faults=tuple(faults),
         hints=tuple(hints),
@@ -168,10 +170,15 @@ def _unfinished(root: Path, generations: Sequence[Generation]) -> list[_Job]:
 
 
 def _unneeded(
-    sizes: dict[str, int], live: Generation, generations: Sequence[Generation], jobs: Sequence[_Job]
+    root: Path,
+    sizes: dict[str, int],
+    live: Generation,
+    generations: Sequence[Generation],
+    jobs: Sequence[_Job],
 ) -> int:
     """Bytes that pruning would free; it keeps generations after the live one, if there are."""
-    kept = [each for each in generations if each.number >= live.number]
+    pinned = pinned_generations(root / BATCHES)
+    kept = [each for each in generations if each.number >= live.number or each.number in pinned]
     at_work = [plan for job, plan, _ in jobs if plan is not None and _at_work(job) is not False]
     return sum(unneeded(sizes, kept, at_work).values())
 

@@ -189,6 +189,13 @@ def error_feature(query: str, message: str) -> Feature:
     return _feature(query, "error", 0, None, properties)
 
 
+def renamed_feature(feature: Feature, query: str) -> Feature:
+    """The same feature of a photo that is the same under another name."""
+    properties = {**feature["properties"], "query": query}
+    kind, rank = properties["kind"], properties.get("rank", 0)
+    return {**feature, "id": _id(query, kind, rank), "properties": properties}
+
+
 def feature_collection(features: Iterable[Feature]) -> FeatureCollection:
     """All features in the order given, with the smallest `bbox` around those that have a place.
 
@@ -231,6 +238,20 @@ def collection_text(
     yield "\n]" + ("" if bbox is None else f',"bbox":{_json(bbox)}') + "}\n"
 
 
+def sequence_text(features: Iterable[Feature]) -> Iterator[str]:
+    """The text of a GeoJSON text sequence (RFC 8142), a feature a record, as they come.
+
+    Every record begins with a record separator (U+001E) and ends with a line feed, so that one
+    that was cut off is known. Names and numbers as `collection_text`.
+
+    Raises
+    ------
+    ValueError : a number is NaN or infinite.
+    """
+    for feature in features:
+        yield f"\x1e{_json(feature)}\n"
+
+
 def _json(value: object) -> str:
     text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return re.sub(r"[\ud800-\udfff]", lambda found: f"\\u{ord(found.group()):04x}", text)
@@ -244,13 +265,16 @@ def _widen(bounds: Bounds, feature: Feature) -> None:
 def _feature(
     query: str, kind: Kind, rank: int, geometry: Point | None, properties: dict[str, object]
 ) -> Feature:
-    name = json.dumps([query, kind, rank])
     return {
         "type": "Feature",
-        "id": hashlib.sha256(name.encode()).hexdigest()[:32],
+        "id": _id(query, kind, rank),
         "geometry": geometry,
         "properties": properties,
     }
+
+
+def _id(query: str, kind: object, rank: object) -> str:
+    return hashlib.sha256(json.dumps([query, kind, rank]).encode()).hexdigest()[:32]
 
 
 def _point(lon_deg: float | None, lat_deg: float | None, height_m: float | None) -> Point | None:

@@ -3,16 +3,19 @@
 image_id is the row number: dense, in the order of the NFC bytes of the uri.
 """
 
-from collections.abc import Sequence
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from io import BytesIO
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from contracts.config import North
@@ -21,7 +24,7 @@ from contracts.errors import BadIndex
 from contracts.records import PosedImage
 from geo.crs import parse_crs
 from index.catalogue_file import MEND, CatalogueFile
-from index.files import write_bytes
+from index.files import write_atomic
 
 GROUP_ROWS = 4096
 """Rows that are read together where one of them is asked for."""
@@ -72,6 +75,7 @@ _TYPES = {
 SCHEMA = pa.schema(
     [(name, _TYPES.get(name, pa.string())) for name in CatalogueRow.__dataclass_fields__]
 )
+_FILE_SCHEMA = SCHEMA.append(pa.field("geometry", pa.binary()))
 
 
 def catalogue_row(
@@ -104,33 +108,51 @@ def catalogue_row(
     )
 
 
-def write_catalogue(path: Path, rows: Sequence[CatalogueRow], crs: str | None) -> str:
-    """Write rows as GeoParquet; returns the sha256.
+def write_catalogue(path: Path, rows: Iterable[CatalogueRow], crs: str | None) -> str:
+    """Write rows as GeoParquet, a group at a time, however many there are; returns the sha256.
 
     crs : of the poses; the geometry (null where there is no pose) has its horizontal part.
     """
-    import geopandas as gpd  # slow to import, and only the writer needs it
-    import shapely
 
-    table = {
-        field.name: pa.array([getattr(row, field.name) for row in rows], type=field.type)
-        for field in SCHEMA
+    def write(stream: IO[bytes]) -> None:
+        bounds = np.empty((0, 2))
+        left = iter(rows)
+        with pq.ParquetWriter(stream, _FILE_SCHEMA, write_page_checksum=True) as writer:
+            while group := list(islice(left, GROUP_ROWS)):
+                xy = np.array([(row.easting, row.northing) for row in group], dtype=np.float64)
+                posed = np.isfinite(xy[:, 0]) & np.isfinite(xy[:, 1])
+                writer.write_table(_table(group, xy, posed))
+                if posed.any():
+                    within = np.concatenate([bounds, xy[posed]])
+                    bounds = np.array([within.min(axis=0), within.max(axis=0)])
+            writer.add_key_value_metadata({"geo": json.dumps(_geometry(crs, bounds))})
+
+    return write_atomic(path, write)
+
+
+def _table(
+    group: Sequence[CatalogueRow], xy: NDArray[np.float64], posed: NDArray[np.bool_]
+) -> pa.Table:
+    import shapely  # slow to import, and only the writer needs it
+
+    points = np.full(len(group), None, dtype=object)
+    points[posed] = shapely.to_wkb(shapely.points(xy[posed]), flavor="iso")
+    columns = [
+        pa.array([getattr(row, field.name) for row in group], type=field.type) for field in SCHEMA
+    ]
+    return pa.table([*columns, pa.array(points, type=pa.binary())], schema=_FILE_SCHEMA)
+
+
+def _geometry(crs: str | None, bounds: NDArray[np.float64]) -> dict[str, object]:
+    """What GeoParquet 1.1 says of the column. bounds : (2, 2) least and most; (0, 2): no pose."""
+    column: dict[str, object] = {
+        "encoding": "WKB",
+        "crs": None if crs is None else parse_crs(crs).to_json_dict(),
+        "geometry_types": ["Point"] if len(bounds) else [],
     }
-    xy = np.array([(row.easting, row.northing) for row in rows], dtype=np.float64).reshape(-1, 2)
-    posed = np.isfinite(xy).all(axis=1)
-    geometry = np.full(len(rows), None, dtype=object)
-    geometry[posed] = shapely.points(xy[posed])
-    horizontal = None if crs is None else parse_crs(crs)
-    frame = gpd.GeoDataFrame(pa.table(table).to_pandas(), geometry=geometry, crs=horizontal)
-    buffer = BytesIO()
-    frame.to_parquet(
-        buffer,
-        index=False,
-        schema_version="1.1.0",
-        row_group_size=GROUP_ROWS,
-        write_page_checksum=True,
-    )
-    return write_bytes(path, buffer.getvalue())
+    if len(bounds):
+        column["bbox"] = bounds.ravel().tolist()
+    return {"version": "1.1.0", "primary_column": "geometry", "columns": {"geometry": column}}
 
 
 class Catalogue:
@@ -199,6 +221,11 @@ class Catalogue:
             return np.asarray(column.cast(pa.timestamp("us", "UTC")))
         except pa.ArrowInvalid:  # zones of a century ago had odd seconds: one by one
             return np.array([_instant(text) for text in column.to_pylist()], "datetime64[us]")
+
+    def counts(self, name: str) -> Counter[str]:
+        """How many images have each value of a text column."""
+        found = pc.value_counts(self._column(name)).to_pylist()
+        return Counter({each["values"]: each["counts"] for each in found})
 
     def is_among(self, name: str, values: Sequence[str]) -> NDArray[np.bool_]:
         """Whose text column has one of these values; (n_images,) bool."""

@@ -27,5 +27,11 @@ def write_wish(folder: Path, wish: Wish) -> None:
     write_bytes(_path(folder), json.dumps({"wish": wish}).encode())
 
 
+def begin_again(folder: Path) -> None:
+    """Whoever starts the work wishes it to run, whatever was wished before."""
+    if read_wish(folder) != "run":
+        write_wish(folder, "run")
+
+
 def _path(folder: Path) -> Path:
     return folder / "control.json"

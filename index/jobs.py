@@ -4,10 +4,15 @@ What remains to be done is derived from here and never from a queue. A receipt c
 the files it names still have the digests it names.
 """
 
+import hashlib
 import json
+import os
 import re
 import shutil
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -24,13 +29,19 @@ from index.manifest import Name
 SCRATCH = ("features", "partials", "pieces", "ids")
 """Folders of a job that nobody needs once it is committed."""
 
+SHOWN_S = 60.0
+"""How long a shared folder may take to show what another machine has written."""
+_LOOK_S = 0.5
 _JOB_ID = re.compile(r"[0-9a-f]{16}")
+_WRITERS = 16
+"""Shards' lists that are written at a time."""
 _MAX_LIST_BYTES = 2**28
 """Of a plan or a shard's list: some half a million images."""
 
 Parsed = TypeVar("Parsed")
 Verb = Literal["index", "add", "compact"]
 _RECEIPT = TypeAdapter(Receipt)
+_REASONS = TypeAdapter(dict[int, str])
 _IMAGES = TypeAdapter(list[PosedImage])
 
 
@@ -101,6 +112,10 @@ class JobFolder:
         """A range of words of a channel, merged and packed."""
         return self.path / "pieces" / channel / f"{first_word:07d}.npz"
 
+    def excluded_of_shard(self, shard: int) -> Path:
+        """Those of them that are left out, since they kill the processes that work on them."""
+        return self.path / "excluded" / f"{shard:06d}.json"
+
     def new_ids(self, segment: str) -> Path:
         """The ids that a segment's images get when it is compacted; int64, -1 = left out."""
         return self.path / "ids" / f"{segment}.npy"
@@ -108,10 +123,16 @@ class JobFolder:
     def receipt_path(self, stage: str, key: str) -> Path:
         return self.path / "receipts" / stage / f"{key}.json"
 
-    def write_plan(self, plan: JobPlan, shards: Sequence[Sequence[PosedImage]]) -> None:
+    def write_plan(self, plan: JobPlan, shards: Iterable[Sequence[PosedImage]]) -> None:
         """Write the shards' lists first and the plan last: a plan on disk is a whole plan."""
-        for number, images in enumerate(shards):
+
+        def write(numbered: tuple[int, Sequence[PosedImage]]) -> None:
+            number, images = numbered
             write_bytes(self.images_of_shard(number), _IMAGES.dump_json(list(images)))
+
+        with ThreadPoolExecutor(_WRITERS) as pool:  # each waits for the disk most of its time
+            for _ in pool.map(write, enumerate(shards)):
+                pass
         write_bytes(self.path / "plan.json", plan.model_dump_json(indent=1).encode())
 
     def read_plan(self) -> JobPlan:
@@ -151,6 +172,22 @@ class JobFolder:
         """
         return _checked(self.indexed_of_shard(shard), _INDEXED.validate_json)
 
+    def write_excluded(self, shard: int, reasons: Mapping[int, str]) -> None:
+        """Leave images out, by their rows. reasons : for people."""
+        write_bytes(self.excluded_of_shard(shard), _REASONS.dump_json(dict(reasons)))
+
+    def read_excluded(self, shard: int) -> dict[int, str]:
+        """Why which rows of a shard are left out.
+
+        Raises
+        ------
+        BadIndex : the list is damaged.
+        """
+        path = self.excluded_of_shard(shard)
+        if not is_shown(path):
+            return {}
+        return _checked(path, _REASONS.validate_json)
+
     def relative(self, path: Path) -> str:
         """A path as receipts name it: relative to the index."""
         return path.relative_to(self.root).as_posix()
@@ -178,6 +215,31 @@ class JobFolder:
                 return None
         return receipt
 
+    def awaited_receipt(self, stage: str, key: str) -> Receipt | None:
+        """The receipt of a task that was just done elsewhere: a shared folder may be slow."""
+        gives_up_at = time.monotonic() + SHOWN_S
+        while (receipt := self.read_receipt(stage, key)) is None:
+            if time.monotonic() > gives_up_at:
+                return None
+            time.sleep(_LOOK_S)
+            is_shown(self.receipt_path(stage, key))
+        return receipt
+
+    def assigned(self, shard: int, words: str) -> Receipt | None:
+        """The valid receipt of a shard that was assigned to these words (`words_digest`)."""
+        receipt = self.valid_receipt("assign", f"{shard:06d}")
+        return receipt if receipt is not None and receipt.made_from == words else None
+
+    def words_digest(self, channels: Iterable[str]) -> str:
+        """A digest of the words that there are; "" while some are not."""
+        digest = hashlib.sha256()
+        for channel in channels:
+            trained = self.read_receipt("train", channel)
+            if trained is None:
+                return ""
+            digest.update(json.dumps(trained.outputs, sort_keys=True).encode())
+        return digest.hexdigest()
+
     def write_skipped(self, rows: Sequence[dict[str, str]]) -> None:
         write_bytes(
             self.path / "skipped.json", json.dumps(rows, indent=1, ensure_ascii=False).encode()
@@ -187,6 +249,18 @@ class JobFolder:
         """Remove what only the job itself needed."""
         for name in SCRATCH:
             shutil.rmtree(self.path / name, ignore_errors=True)
+
+
+def is_shown(path: Path) -> bool:
+    """Whether a file is there, as the server of a shared folder knows it.
+
+    A client remembers for a minute which files are not there (NFS), unless the folder that they
+    would be in was opened since.
+    """
+    for folder in (path.parent.parent, path.parent):
+        with suppress(OSError):
+            os.close(os.open(folder, os.O_RDONLY | os.O_DIRECTORY))
+    return path.is_file()
 
 
 def jobs_of(root: Path) -> list[JobFolder]:

@@ -10,10 +10,13 @@ from pyproj.transformer import AreaOfInterest
 
 from contracts.config import IndexConfig
 from contracts.errors import BadConfig, BadIndex
+from contracts.places import Place
+from contracts.progress import Progress
 from contracts.records import Postings
 from geo.crs import ToWgs84
 from index.catalogue import Catalogue
 from index.codebooks import codebook_paths, count_words, read_searcher
+from index.fetched import at_hand
 from index.files import check_files, map_array
 from index.manifest import Generation, SegmentEntry, generation_path, read_generation
 from index.segments import map_segment, segment_paths
@@ -26,13 +29,20 @@ from retrieval.postings import inverse_document_frequency
 class OpenedIndex:
     """One generation of an index, None: the live one; later commits do not touch what it reads.
 
+    place : its folder, or the URL that it was published to, from where it is fetched first.
+
     Raises
     ------
     BadIndex : not an index, a later format, or files missing or of another size than written.
     """
 
-    def __init__(self, root: Path, number: int | None = None) -> None:
-        self.root = root
+    def __init__(
+        self, place: Place, number: int | None = None, progress: Progress | None = None
+    ) -> None:
+        self.place = str(place.absolute())
+        """Where any machine finds it."""
+        self._held = at_hand(place, number, progress)
+        self.root = root = self._held.root
         self.generation: Generation = read_generation(root, number)
         check_files(root, self.generation.sizes)
         self._check_numbers()

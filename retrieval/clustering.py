@@ -1,6 +1,7 @@
 """K-means of byte descriptors: flat, and in two levels where flat would take minutes.
 
-The same points, number and seed give the same centres: one thread, one order of summing.
+The same points, number and seed give the same centres: every sum is made by one thread, in one
+order, and threads share what does not depend on each other.
 """
 
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ import faiss
 import numpy as np
 from numpy.typing import NDArray
 
+from retrieval.kernels import in_threads
 from retrieval.word_search import lists_around, nearest_words, one_list
 
 _ITERATIONS = 15
@@ -33,11 +35,13 @@ def one_thread() -> Iterator[None]:
         faiss.omp_set_num_threads(threads)
 
 
-def kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArray[np.uint8]:
+def kmeans(
+    points: NDArray[np.uint8], n_clusters: int, seed: int, n_threads: int = 1
+) -> NDArray[np.uint8]:
     """Find (n_clusters, D) whole-number centres of (n, D) points, flat or in two levels."""
     if in_one_level(len(points), n_clusters):
         return flat_kmeans(points, n_clusters, seed)
-    return two_level_kmeans(points, n_clusters, seed)
+    return two_level_kmeans(points, n_clusters, seed, n_threads)
 
 
 def in_one_level(n_points: int, n_clusters: int) -> bool:
@@ -64,36 +68,39 @@ def flat_kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArra
     return np.clip(np.rint(centres), 0, 255).astype(np.uint8)
 
 
-def two_level_kmeans(points: NDArray[np.uint8], n_clusters: int, seed: int) -> NDArray[np.uint8]:
+def two_level_kmeans(
+    points: NDArray[np.uint8], n_clusters: int, seed: int, n_threads: int = 1
+) -> NDArray[np.uint8]:
     """About sqrt(n_clusters) coarse clusters, each one's share of centres within it, then mend.
 
     Three Lloyd steps over all points let centres cross the borders of the coarse clusters.
     """
     n_coarse = round(np.sqrt(n_clusters))
     coarse = flat_kmeans(points[: n_coarse * _POINTS_PER_COARSE_CLUSTER], n_coarse, seed)
-    nearest = nearest_words(points, coarse, one_list(coarse), 1)[0][:, 0]
+    nearest = nearest_words(points, coarse, one_list(coarse), 1, None, n_threads)[0][:, 0]
     sizes = np.bincount(nearest, minlength=n_coarse)
     members = np.split(np.argsort(nearest, kind="stable"), np.cumsum(sizes)[:-1])
-    centres = np.concatenate(
-        [
-            flat_kmeans(points[rows], int(share), seed + 1 + cluster)
-            for cluster, (rows, share) in enumerate(
-                zip(members, share_out(n_clusters, sizes), strict=True)
-            )
-            if share
-        ]
-    )
+    shares = share_out(n_clusters, sizes).tolist()
+
+    def divide(cluster: int) -> NDArray[np.uint8]:
+        return flat_kmeans(points[members[cluster]], shares[cluster], seed + 1 + cluster)
+
+    shared = (cluster for cluster, share in enumerate(shares) if share)
+    centres = np.concatenate(list(in_threads(divide, shared, n_threads)))
     for _ in range(_REFINEMENTS):
-        centres = _lloyd_step(points, centres, coarse)
+        centres = _lloyd_step(points, centres, coarse, n_threads)
     return centres
 
 
 def _lloyd_step(
-    points: NDArray[np.uint8], centres: NDArray[np.uint8], coarse: NDArray[np.uint8]
+    points: NDArray[np.uint8],
+    centres: NDArray[np.uint8],
+    coarse: NDArray[np.uint8],
+    n_threads: int,
 ) -> NDArray[np.uint8]:
     """Move each centre to the rounded mean of the points that find it; one without stays."""
     lists = lists_around(coarse, centres)
-    nearest = nearest_words(points, centres, lists, 1, _REFINEMENT_PROBES)[0][:, 0]
+    nearest = nearest_words(points, centres, lists, 1, _REFINEMENT_PROBES, n_threads)[0][:, 0]
     order = np.argsort(nearest, kind="stable")
     sizes = np.bincount(nearest, minlength=len(centres))
     starts = np.concatenate([[0], np.cumsum(sizes)])

@@ -1,4 +1,4 @@
-"""Visual words: sampling descriptors whatever the shards, training words, finding the nearest.
+"""Visual words: training them from a sample, finding the nearest.
 
 Descriptors and words are uint8, so that every squared distance is a whole number below 2**24,
 exact in float32: see docs/decisions/0002-integer-descriptors-and-words.md.
@@ -27,14 +27,9 @@ _WORDS_PER_LIST_SAMPLED = 32
 
 DISTANCE_SAMPLE = 10_000
 
-_SPARE_SHARE = 1.25
-"""How far a reservoir may fill beyond its size before it is cut back to it."""
-
 _OTHER_STREETS = 1.5
 _OWN_POINTS = 6.5
 """How much farther from their words descriptors of other streets of a survey may lie."""
-
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,83 +109,6 @@ class WordSearcher:
         return nearest_words(descriptors, words, self._lists, min(k, n_words))
 
 
-class SampleReservoir:
-    """Keeps the `max_points` descriptors of the smallest keys, in bounded memory.
-
-    What it keeps does not depend on the order, or the portions, of what it is offered.
-    """
-
-    def __init__(self, max_points: int) -> None:
-        self._max_points = max_points
-        self._keys: list[NDArray[np.uint64]] = []
-        self._descriptors: list[NDArray[np.uint8]] = []
-        self._n_held = 0
-        self._largest_of_use = np.uint64(2**64 - 1)
-
-    def offer(self, keys: NDArray[np.uint64], descriptors: NDArray[np.uint8]) -> None:
-        """Take in (n,) uint64 keys and their (n, D) uint8 descriptors.
-
-        Raises
-        ------
-        WrongInput : not one key per descriptor.
-        """
-        if len(keys) != len(descriptors):
-            raise WrongInput(f"{len(keys)} sample keys were offered for {len(descriptors)} points")
-        wanted = keys <= self._largest_of_use
-        self._keys.append(keys[wanted])
-        self._descriptors.append(descriptors[wanted])
-        self._n_held += int(wanted.sum())
-        if self._n_held > _SPARE_SHARE * self._max_points:
-            self._shrink()
-
-    def sample(self) -> NDArray[np.uint8]:
-        """Give the sample by ascending key, then descriptor bytes; (n, D) uint8.
-
-        Raises
-        ------
-        WrongInput : nothing was ever offered, not even an empty array of the right width.
-        """
-        if not self._descriptors:
-            raise WrongInput("no descriptors were offered to sample from; extract features first")
-        self._shrink()
-        return self._descriptors[0]
-
-    def _shrink(self) -> None:
-        keys, descriptors = np.concatenate(self._keys), np.concatenate(self._descriptors)
-        self._descriptors = []
-        order = np.argsort(keys, kind="stable")
-        keys = keys[order]
-        repeats = np.flatnonzero(np.diff(keys) == 0)
-        tied = np.union1d(repeats, repeats + 1)
-        among = descriptors[order[tied]]
-        order[tied] = order[tied[np.lexsort((*among.T[::-1], keys[tied]))]]
-        self._keys = [keys[: self._max_points].copy()]
-        self._descriptors = [descriptors[order[: self._max_points]]]
-        self._n_held = len(self._keys[0])
-        if self._n_held == self._max_points:
-            self._largest_of_use = self._keys[0][-1]
-
-
-def sample_keys(image_sha256: str, n_frames: int, seed: int) -> NDArray[np.uint64]:
-    """Hash each frame of an image for sampling; (n_frames,) uint64.
-
-    splitmix64 (Steele, Lea & Flood 2014) started at the first 8 bytes of the image's sha256,
-    mixed with the seed. It knows nothing of shards, so neither does the sample.
-
-    Raises
-    ------
-    WrongInput : not a hexadecimal digest of 8 bytes or more.
-    """
-    try:
-        head = int(image_sha256[:16], 16)
-    except ValueError:
-        head = -1
-    if head < 0 or len(image_sha256) < 16:
-        raise WrongInput(f"an image's sha256 must be hexadecimal; got {image_sha256!r}")
-    start = np.array([head], dtype=np.uint64) ^ _mixed(np.array([seed], dtype=np.uint64) + _GOLDEN)
-    return _mixed(_mixed(start) + np.arange(1, n_frames + 1, dtype=np.uint64) * _GOLDEN)
-
-
 def build_search(words: NDArray[np.uint8]) -> WordLists:
     """Group (V, D) uint8 words for the search; the same lists for any order of the words."""
     n_lists = n_lists_for(len(words))
@@ -249,7 +167,9 @@ def _usual_growth(points_per_word: float) -> float:
     return max(_OTHER_STREETS, 1 + _OWN_POINTS / math.sqrt(points_per_word))
 
 
-def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebook:
+def train_codebook(
+    sample: NDArray[np.uint8], n_words: int, seed: int, n_threads: int = 1
+) -> Codebook:
     """Make words by k-means; the same sample, number and seed give the same words.
 
     Words equal after rounding are kept once, so fewer than `n_words` may come back. They come
@@ -258,8 +178,8 @@ def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebo
 
     Parameters
     ----------
-    sample : (n, D) uint8, in canonical order, as `SampleReservoir.sample` gives it.
-    n_words : at most n.
+    sample : (n, D) uint8, in canonical order, as `SampleReservoir.sample` (sampling.py) gives it.
+    n_words : at most n. n_threads : that share the work; the words do not depend on them.
 
     Raises
     ------
@@ -273,16 +193,9 @@ def train_codebook(sample: NDArray[np.uint8], n_words: int, seed: int) -> Codebo
     if not len(sample):
         nowhere = np.zeros(MAX_NEIGHBOURS, dtype=np.float32)
         return Codebook(sample.copy(), 0.0, nowhere, nowhere)
-    words = np.unique(kmeans(sample, n_words, seed), axis=0)
+    words = np.unique(kmeans(sample, n_words, seed, n_threads), axis=0)
     words = words[build_search(words).word_ids]
     return Codebook(words, *_distance_range(sample[:DISTANCE_SAMPLE], words))
-
-
-def _mixed(state: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Finish splitmix64; whole numbers wrap at 2**64."""
-    state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return state ^ (state >> np.uint64(31))
 
 
 def _distance_range(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadIndex, WrongInput
-from retrieval.kernels import kernel, read_only
+from retrieval.kernels import in_threads, kernel, read_only
 
 _PROBES_PER_ROOT_LIST = 0.72
 """Lists searched, as a multiple of sqrt(C): see docs/decisions/0022."""
@@ -68,6 +68,7 @@ def nearest_words(
     lists: WordLists,
     k: int,
     n_probes: int | None = None,
+    n_threads: int = 1,
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Find k words of each descriptor.
 
@@ -76,6 +77,7 @@ def nearest_words(
     descriptors : (n, D) uint8. words : (V, D) uint8. lists : of these words.
     k : at most V. n_probes : lists searched; all, where these hold fewer than k words. None: as
         many as find 0.95 of the nearest words of real descriptors, or more.
+    n_threads : that share the work; what is found does not depend on them.
 
     Returns
     -------
@@ -88,13 +90,17 @@ def nearest_words(
     """
     word_ids = np.empty((len(descriptors), k), dtype=np.int32)
     sq_dist = np.empty((len(descriptors), k), dtype=np.float32)
-    if n_probes is None:
-        n_probes = usual_probes(len(lists.centres))
-    for start in range(0, len(descriptors) if k else 0, _BATCH):
+    probes = usual_probes(len(lists.centres)) if n_probes is None else n_probes
+
+    def search(start: int) -> None:
         rows = slice(start, start + _BATCH)
-        keys = _nearest_keys(_widened(descriptors[rows]), words, lists, k, n_probes)
+        keys = _nearest_keys(_widened(descriptors[rows]), words, lists, k, probes)
         word_ids[rows] = keys & 0xFFFFFFFF
         sq_dist[rows] = keys >> 32
+
+    starts = range(0, len(descriptors) if k else 0, _BATCH)
+    for _ in in_threads(search, starts, n_threads):
+        pass
     return word_ids, sq_dist
 
 

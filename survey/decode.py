@@ -22,6 +22,7 @@ from survey.fragments import Message, View, parse_fragment
 from survey.image_file import DAMAGED, image_bytes, opened
 from survey.image_header import exif_turns, header_of
 from survey.panorama import panorama_area
+from survey.stored import State, state_of
 
 # Modes whose values can be averaged, unlike a palette's.
 _REDUCIBLE = {"L", "LA", "RGB", "RGBA", "CMYK", "YCbCr"}
@@ -145,11 +146,10 @@ def _view(
     max_pixels: int,
 ) -> DecodedImage:
     try:
-        found = Path(path).stat()
+        version = state_of(path)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise UnusableImage(f"cannot be opened: {reason}") from error
-    version = (found.st_size, found.st_mtime_ns)
     panorama = _panorama(
         path, version, message, quarter_turns, view.fov_deg, max_side_px, max_pixels
     )
@@ -162,7 +162,7 @@ def _view(
 @functools.lru_cache(maxsize=1)
 def _panorama(
     path: str,
-    version: tuple[int, int],
+    version: State,
     message: Message | None,
     quarter_turns: int,
     fov_deg: float,

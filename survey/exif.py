@@ -9,12 +9,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from numbers import Rational
-from pathlib import Path
 
 from PIL import ExifTags
 
 from contracts.config import North
 from contracts.errors import BadSurvey, UnusableImage
+from contracts.places import Place
 from contracts.records import Camera, Pose, PosedImage, Skipped
 from survey.equirectangular import PanoramaArea
 from survey.files import list_images
@@ -35,12 +35,12 @@ _NO_GPS = "no GPS position in its EXIF"
 _Tags = Mapping[int, object]
 
 
-def recognises(path: Path) -> bool:
+def recognises(path: Place) -> bool:
     """Any folder: whether its images have positions is known once they have been opened."""
     return path.is_dir()
 
 
-def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
+def read(path: Place, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
     """Every image with a GPS position; opens the header of each.
 
     Raises
@@ -86,7 +86,7 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     return Reading(tuple(_in_crs(image, crs) for image in images), tuple(skipped), crs, notes)
 
 
-def _untaken_mcap(path: Path) -> str:
+def _untaken_mcap(path: Place) -> str:
     names = list(mcap_files(path)[0])
     return f"; {names[0]} is there: --format mcap reads the images in it instead" if names else ""
 

@@ -3,11 +3,18 @@
 import os
 import stat
 import unicodedata
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from contracts.errors import BadSurvey
+from contracts.places import Place
 from contracts.records import Skipped
+from survey.stored import objects_below
+
+if TYPE_CHECKING:
+    from upath import UPath
 
 IMAGE_SUFFIXES = frozenset(
     {
@@ -39,8 +46,8 @@ class Listing:
     skipped: tuple[Skipped, ...]
 
 
-def list_images(root: Path) -> Listing:
-    """Every regular file under `root` whose name ends like an image's.
+def list_images(root: Place) -> Listing:
+    """Every regular file or object under `root` whose name ends like an image's.
 
     Hidden files and folders (names with a leading dot) are not looked at. Symbolic links to
     files are followed as long as they stay inside the root; links to folders inside it are not,
@@ -50,6 +57,41 @@ def list_images(root: Path) -> Listing:
     ------
     BadSurvey : the root itself cannot be listed.
     """
+    return _listed_folder(root) if isinstance(root, Path) else _listed_store(root)
+
+
+def _listed_store(root: "UPath") -> Listing:
+    found: dict[str, str] = {}
+    skipped: list[Skipped] = []
+    for name in visible_objects(root):
+        if not is_image_name(name):
+            continue
+        uri = printable_uri(name)
+        if {"", ".", ".."} & set(name.split("/")):
+            reason = "its name has an empty part, . or .. between /; rename it in the store"
+            skipped.append(Skipped(uri, reason))
+        else:
+            _add(found, skipped, uri, f"{str(root).rstrip('/')}/{name}")
+    return Listing(found, tuple(skipped))
+
+
+def visible_objects(root: "UPath") -> Iterator[str]:
+    """Names of the objects of a survey in a store, relative to it, without hidden ones.
+
+    Raises
+    ------
+    BadSurvey : the store cannot be listed.
+    """
+    try:
+        names = objects_below(root)
+    except OSError as error:
+        raise BadSurvey(f"survey {root} cannot be listed: {error.strerror}") from error
+    for name in names:
+        if name and not any(part.startswith(".") and part.strip(".") for part in name.split("/")):
+            yield name
+
+
+def _listed_folder(root: Path) -> Listing:
     found: dict[str, str] = {}
     skipped: list[Skipped] = []
     real_root = os.path.realpath(root)

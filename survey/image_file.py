@@ -19,7 +19,9 @@ import pi_heif
 from PIL import Image, UnidentifiedImageError
 
 from contracts.errors import UnusableImage
+from contracts.places import is_url
 from survey.fragments import Message
+from survey.stored import open_object
 
 # Only raster formats: Pillow's others start programs (EPS), hold no photograph, or are obscure.
 _FORMATS = ("JPEG", "PNG", "TIFF", "WEBP", "BMP", "JPEG2000", "PPM", "HEIF")
@@ -42,14 +44,21 @@ _Result = TypeVar("_Result")
 pi_heif.register_heif_opener(thumbnails=False, depth_images=False, decode_threads=1)
 
 
+MAX_OBJECT_BYTES = 1 << 30
+"""Of an image in a store, which is read as a whole before its header is looked at."""
+
+
 def regular_file(path: str | Path) -> BinaryIO:
-    """Open for reading; a pipe or device is refused instead of waited for.
+    """Open for reading a file, or an object by its URL; a pipe or device is not waited for.
 
     Raises
     ------
-    UnusableImage : no file, not a regular one, or one that may not be read.
+    UnusableImage : no file, not a regular one, or one that may not be read; no such object.
+    TaskFailed : the store does not answer, or not to us: that is not the image's fault.
     """
     try:
+        if is_url(str(path)):
+            return open_object(str(path))
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
@@ -60,6 +69,18 @@ def regular_file(path: str | Path) -> BinaryIO:
     return os.fdopen(handle, "rb")
 
 
+def _whole_object(path: str) -> BinaryIO:
+    """All of an object at once: asking for its header first would only cost time."""
+    with regular_file(path) as file:
+        size = file.seek(0, os.SEEK_END)
+        if size > MAX_OBJECT_BYTES:
+            raise UnusableImage(
+                f"is {size} bytes large, more than the {MAX_OBJECT_BYTES} of an image"
+            )
+        file.seek(0)
+        return io.BytesIO(file.read())
+
+
 def image_bytes(path: str | Path, message: Message | None, max_pixels: int) -> bytes:
     """An image as it is stored: a whole file, or a message of an MCAP file.
 
@@ -67,7 +88,9 @@ def image_bytes(path: str | Path, message: Message | None, max_pixels: int) -> b
 
     Raises
     ------
-    UnusableImage : as `regular_file` and `opened`, no such message, or too many pixels.
+    UnusableImage : as `regular_file` and `opened`, no such message, too many pixels, or an object
+        larger than `MAX_OBJECT_BYTES`.
+    TaskFailed : as `regular_file`.
     """
     if message is not None:
         from survey.mcap.payload import image_bytes as message_bytes
@@ -76,7 +99,7 @@ def image_bytes(path: str | Path, message: Message | None, max_pixels: int) -> b
         with opened(io.BytesIO(data)) as image:
             _check_size(image, max_pixels)
         return data
-    with regular_file(path) as file:
+    with _whole_object(str(path)) if is_url(str(path)) else regular_file(path) as file:
         with opened(file) as image:
             _check_size(image, max_pixels)
         file.seek(0)

@@ -8,12 +8,12 @@ Timestamps may be any number, so they are not read as times. North: grid; `north
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from contracts.config import North
 from contracts.errors import BadSurvey, UnknownCrs
+from contracts.places import Place
 from contracts.records import Camera, Pose, PosedImage, Skipped
 from geo.rotations import hpr_from_rotations
 from survey.files import Listing, list_images, printable_uri
@@ -21,7 +21,7 @@ from survey.kapture_text import Line, Rigid, camera, lines, pose_numbers, rigids
 from survey.options import Reader, Reading, ReadOptions
 from survey.poses import crs_name, is_geographic, normalised, pose_problem
 
-_SENSORS = Path("sensors")
+_SENSORS = "sensors"
 _RECORDS = "sensors/records_camera.txt"
 _TRAJECTORIES = "sensors/trajectories.txt"
 _DATA = "sensors/records_data/"
@@ -50,12 +50,12 @@ class _Track:
     rigs: dict[str, list[tuple[str, Rigid]]]
 
 
-def recognises(path: Path) -> bool:
+def recognises(path: Place) -> bool:
     """A folder with the two files that name cameras and images."""
     return (path / _SENSORS / "sensors.txt").is_file() and (path / _RECORDS).is_file()
 
 
-def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
+def read(path: Place, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
     """Every image that has a pose; no image is opened.
 
     Raises
@@ -80,7 +80,7 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     return Reading(posed, (*skipped, *unread, *impossible, *unnamed, *listing.skipped), crs)
 
 
-def _crs(path: Path, options: ReadOptions) -> str:
+def _crs(path: Place, options: ReadOptions) -> str:
     if options.crs is None:
         raise UnknownCrs(
             f"kapture folder {path}: its poses are in metres of a system that it does not name; "
@@ -95,7 +95,7 @@ def _crs(path: Path, options: ReadOptions) -> str:
     return crs
 
 
-def _cameras(path: Path) -> dict[str, Camera]:
+def _cameras(path: Place) -> dict[str, Camera]:
     cameras: dict[str, Camera] = {}
     for line in lines(path):
         if len(line.cells) < 3 or line.cells[2] != "camera":
@@ -109,7 +109,7 @@ def _cameras(path: Path) -> dict[str, Camera]:
     return cameras
 
 
-def _poses(path: Path) -> tuple[dict[_When, _Placed | str], list[Skipped]]:
+def _poses(path: Place) -> tuple[dict[_When, _Placed | str], list[Skipped]]:
     """Poses of devices, and the lines that name none."""
     numbers: dict[_When, list[float]] = {}
     unusable: dict[_When, str] = {}
@@ -136,7 +136,7 @@ def _poses(path: Path) -> tuple[dict[_When, _Placed | str], list[Skipped]]:
     return {**poses, **unusable}, unread
 
 
-def _rigs(path: Path) -> dict[str, list[tuple[str, Rigid]]]:
+def _rigs(path: Place) -> dict[str, list[tuple[str, Rigid]]]:
     rigs: dict[str, list[tuple[str, Rigid]]] = defaultdict(list)
     for line in lines(path) if path.is_file() else ():
         try:
@@ -156,7 +156,7 @@ def _when(line: Line) -> _When:
 
 
 def _match(
-    path: Path,
+    path: Place,
     cameras: dict[str, Camera],
     track: _Track,
     listing: Listing,

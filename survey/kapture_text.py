@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadSurvey
+from contracts.places import Place
 from contracts.records import Camera
 from geo.rotations import rotations_from_quaternions
 from survey.poses import finite_number
@@ -52,7 +52,7 @@ class Line:
     cells: list[str]
 
 
-def lines(path: Path) -> Iterator[Line]:
+def lines(path: Place) -> Iterator[Line]:
     """The lines of a file that hold something.
 
     Raises

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from contracts.config import North
 from contracts.globs import glob_matcher
+from contracts.places import Place
 from contracts.records import PosedImage, Skipped
 
 
@@ -90,8 +91,8 @@ class Reader:
     """
 
     name: str
-    recognises: Callable[[Path], bool]
-    read: Callable[[Path, ReadOptions, Callable[[str], bool]], Reading]
+    recognises: Callable[[Place], bool]
+    read: Callable[[Place, ReadOptions, Callable[[str], bool]], Reading]
 
 
 def selector(options: ReadOptions) -> Callable[[str], bool]:

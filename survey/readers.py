@@ -8,15 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from contracts.errors import BadConfig, BadSurvey
+from contracts.places import Place
 from survey import exif, kapture, mcap, plain, stereopolis, tables, utm_names
 from survey.files import list_images
 from survey.options import Reader, ReadOptions
 from survey.poses import crs_name
+from survey.stored import is_file, list_anew
 
 
-def _recognises_mcap(path: Path) -> bool:
+def _recognises_mcap(path: Place) -> bool:
     """An MCAP file, or a folder with some and without image files."""
-    return mcap.READER.recognises(path) and (path.is_file() or not list_images(path).paths)
+    return mcap.READER.recognises(path) and (is_file(path) or not list_images(path).paths)
 
 
 _MCAP = replace(mcap.READER, recognises=_recognises_mcap)
@@ -32,7 +34,7 @@ READERS: tuple[Reader, ...] = (
 )
 
 
-def choose_reader(path: Path, options: ReadOptions) -> Reader:
+def choose_reader(path: Place, options: ReadOptions) -> Reader:
     """The reader that `options.format` names, or the first that recognises the path.
 
     Raises
@@ -42,15 +44,16 @@ def choose_reader(path: Path, options: ReadOptions) -> Reader:
     """
     if options.crs is not None:
         crs_name(options.crs)
+    list_anew(path)
     try:
-        if not path.exists():
+        if isinstance(path, Path) and not path.exists():
             raise BadSurvey(f"survey {path} does not exist; check the path")
         return _chosen(path, options)
     except OSError as error:
         raise BadSurvey(f"survey {path} cannot be looked into: {error.strerror}") from error
 
 
-def _chosen(path: Path, options: ReadOptions) -> Reader:
+def _chosen(path: Place, options: ReadOptions) -> Reader:
     names = ", ".join(reader.name for reader in READERS)
     if options.format is not None:
         for reader in READERS:

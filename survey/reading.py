@@ -3,11 +3,11 @@
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from contracts.errors import BadSurvey
+from contracts.places import Place, place_of
 from contracts.records import Pose, PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.caveats import caveats
@@ -18,7 +18,7 @@ from survey.readers import choose_reader
 from survey.track import with_track_headings
 
 
-def read_survey(path: Path, options: ReadOptions) -> Survey:
+def read_survey(path: Place, options: ReadOptions) -> Survey:
     """Every image of a survey, with its pose, in the order of the bytes of the uris.
 
     The order and the content depend on the files alone, never on the order in which a file
@@ -30,7 +30,7 @@ def read_survey(path: Path, options: ReadOptions) -> Survey:
         not hold. UnknownCrs : coordinates whose system is missing, unknown or has no exact
         conversion to WGS 84. BadConfig : `options.format` names no reader.
     """
-    path = Path(path)
+    path = place_of(str(path))
     reader = choose_reader(path, options)
     reading = read_wanted(reader, path, options)
     if reading.crs is not None:
@@ -78,7 +78,7 @@ def _with_headings(reading: Reading) -> Reading:
     return replace(reading, images=images, notes=(*reading.notes, note))
 
 
-def read_wanted(reader: Reader, path: Path, options: ReadOptions) -> Reading:
+def read_wanted(reader: Reader, path: Place, options: ReadOptions) -> Reading:
     """What a reader finds of what is asked for, with poses if they are wanted; not yet judged.
 
     Raises
@@ -98,7 +98,7 @@ def read_wanted(reader: Reader, path: Path, options: ReadOptions) -> Reading:
     )
 
 
-def _inside_area(reading: Reading, path: Path) -> Reading:
+def _inside_area(reading: Reading, path: Place) -> Reading:
     """Leave out poses that lie far from where the coordinate system is used."""
     crs, poses = reading.crs, [image.pose for image in reading.images]
     known = [pose for pose in poses if pose is not None]
@@ -118,7 +118,7 @@ def _inside_area(reading: Reading, path: Path) -> Reading:
     return replace(reading, images=kept, skipped=reading.skipped + skipped)
 
 
-def _all_outside(path: Path, first: Pose, crs: str) -> str:
+def _all_outside(path: Place, first: Pose, crs: str) -> str:
     return (
         f"survey {path}: every pose lies far outside the area of use of {crs}; the first has "
         f"easting (x) {first.easting:g}, northing (y) {first.northing:g}. Either x and y are "
@@ -126,7 +126,7 @@ def _all_outside(path: Path, first: Pose, crs: str) -> str:
     )
 
 
-def why_empty(path: Path, skipped: tuple[Skipped, ...], options: ReadOptions) -> str:
+def why_empty(path: Place, skipped: tuple[Skipped, ...], options: ReadOptions) -> str:
     """What a person is told of a survey without one usable image."""
     if skipped:
         reasons = Counter(skip.reason for skip in skipped)

@@ -8,12 +8,12 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from contracts.config import North
 from contracts.errors import BadSurvey
+from contracts.places import Place
 from contracts.records import Camera, Pose, PosedImage, Skipped
 from geo.attitude import Attitude, camera_attitude, enu_from_frd
 from geo.crs import grid_of
@@ -51,12 +51,12 @@ class _Shot:
     panorama: _Panorama
 
 
-def recognises(path: Path) -> bool:
+def recognises(path: Place) -> bool:
     """A folder with both metadata files."""
     return (path / PANORAMAS).is_file() and (path / CALIBRATION).is_file()
 
 
-def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
+def read(path: Place, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
     """Every image with the pose of its camera; no image is opened.
 
     Raises
@@ -90,7 +90,7 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     return Reading(tuple(images), tuple(skipped), CRS)
 
 
-def _require(masks: set[str], listing: Listing, path: Path) -> None:
+def _require(masks: set[str], listing: Listing, path: Place) -> None:
     missing = sorted(masks - listing.paths.keys())
     if missing:
         raise BadSurvey(
@@ -150,7 +150,7 @@ def _posed(uri: str, shot: _Shot, listing: Listing, options: ReadOptions) -> Pos
     )
 
 
-def _read_panoramas(path: Path) -> tuple[dict[int, _Panorama | str], list[Skipped]]:
+def _read_panoramas(path: Place) -> tuple[dict[int, _Panorama | str], list[Skipped]]:
     """Panoramas by id, or why the images of one cannot be placed."""
     panoramas: dict[int, _Panorama | str] = {}
     skipped: list[Skipped] = []

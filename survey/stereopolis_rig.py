@@ -14,12 +14,12 @@ Conventions, as iTowns 1 reads the same file and as the images confirm
 import json
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadSurvey
+from contracts.places import Place
 from geo.attitude import is_rotation
 
 _QUARTER_TURNS = {0: 1, 1: 3, 2: 2, 3: 0}
@@ -41,7 +41,7 @@ class RigCamera:
     mask: str | None
 
 
-def read_rig(path: Path) -> dict[str, RigCamera]:
+def read_rig(path: Place) -> dict[str, RigCamera]:
     """Cameras by name, as in the files' names.
 
     Raises
@@ -62,7 +62,7 @@ def read_rig(path: Path) -> dict[str, RigCamera]:
     return cameras
 
 
-def read_json_list(path: Path) -> list[object]:
+def read_json_list(path: Place) -> list[object]:
     """The list that a JSON file holds.
 
     Raises

@@ -10,12 +10,13 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import numpy as np
 
 from contracts.config import North
 from contracts.errors import BadSurvey
+from contracts.places import Place
 from contracts.records import Pose, PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.files import is_image_name, list_images
@@ -27,8 +28,10 @@ _NORTHERN, _SOUTHERN = "NPQRSTUVWX", "CDEFGHJKLM"
 _DEGREES = "EPSG:4326"
 
 
-def recognises(path: Path) -> bool:
+def recognises(path: Place) -> bool:
     """A folder; the first of its folders that holds images names one like this."""
+    if not isinstance(path, Path):
+        return any(_fields(PurePath(name).name) is not None for name in list_images(path).paths)
     for _, folders, names in os.walk(path):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         images = [name for name in names if is_image_name(name)]
@@ -37,7 +40,7 @@ def recognises(path: Path) -> bool:
     return False
 
 
-def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
+def read(path: Place, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
     """Every image whose name holds a position; no image is opened.
 
     Of several UTM zones the positions are brought into longitude and latitude.
@@ -119,7 +122,7 @@ def _zone_crs(zone: str, letter: str, latitude: str) -> str:
 
 
 def _refuse_one_grid(
-    path: Path, zones: Sequence[str], given: str | None, north: North | None
+    path: Place, zones: Sequence[str], given: str | None, north: North | None
 ) -> None:
     what = f"--crs {given}" if given is not None else "--north grid" if north == "grid" else ""
     if what:

@@ -2,13 +2,18 @@
 
 import os
 import signal
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from store_address import store_environment
 
 from workers.run import worker_environment
 
 os.environ.update(worker_environment())  # before numba is imported: one cache with the workers'
+os.environ.update(store_environment())  # before workers are started: they read there as well
 
 import numpy as np
 import pytest
@@ -22,6 +27,9 @@ from coordinator.intake import read_surveys
 from coordinator.plan import make_plan
 from index.opened import OpenedIndex
 from survey import ReadOptions
+
+if TYPE_CHECKING:
+    from object_store import Bucket, Server
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -83,3 +91,20 @@ def indexed(
         return OpenedIndex(root)
 
     return made
+
+
+@pytest.fixture(scope="session")
+def store() -> "Iterator[Server]":
+    """A real server that speaks S3."""
+    from object_store import serving  # moto takes a second to import
+
+    with serving(os.environ["AWS_ENDPOINT_URL"]) as server:
+        yield server
+
+
+@pytest.fixture
+def bucket(store: "Server") -> "Bucket":
+    """An empty bucket of its own."""
+    from object_store import new_bucket
+
+    return new_bucket(f"town-{uuid.uuid4().hex[:12]}")

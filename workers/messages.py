@@ -1,7 +1,7 @@
 """What may stand in a message: ids and paths, checked before anything is done with them."""
 
 import json
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -9,6 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     ValidationError,
@@ -16,8 +17,9 @@ from pydantic import (
 )
 
 from contracts.config import SearchConfig, Vote, Weight
-from contracts.errors import Refused, TaskFailed
+from contracts.errors import BadConfig, Refused, TaskFailed
 from contracts.faults import first_fault
+from index.files import read_text_file
 from index.jobs import JobFolder, JobPlan
 from workers.roots import Roots
 
@@ -83,6 +85,21 @@ class Envelope(Message):
             raise TaskFailed(f"A message is larger than {MAX_MESSAGE_BYTES} bytes.")
         return cls.parse(content)
 
+    def sealed(self) -> dict[str, Any]:
+        """As JSON, to be sent.
+
+        Raises
+        ------
+        BadConfig : it is too large; workers would not read it.
+        """
+        content = self.model_dump(mode="json")
+        if (size := len(json.dumps(content))) > MAX_MESSAGE_BYTES:
+            raise BadConfig(
+                f"A message would have {size} bytes; at most {MAX_MESSAGE_BYTES} are sent. A "
+                "polygon of --within is the only thing that grows so: give it fewer corners."
+            )
+        return content
+
 
 def _localised(path: str, info: ValidationInfo) -> str:
     return info.context.local(path) if isinstance(info.context, Roots) else path
@@ -122,6 +139,10 @@ def job_message(job: JobFolder, plan: JobPlan, **particulars: object) -> dict[st
     return {"index": str(job.root), "job": job.job, "config_digest": digest, **particulars}
 
 
+Channel = Annotated[str, Field(pattern=r"^[a-z]+-[a-z]+$")]
+"""A detector and a descriptor. Files are named by it: nothing else may stand in it."""
+
+
 class ExtractMessage(JobMessage):
     shard: Annotated[int, Field(ge=0)]
 
@@ -135,7 +156,7 @@ class ProbeMessage(JobMessage):
 
 
 class TrainMessage(JobMessage):
-    channel: str
+    channel: Channel
 
 
 class AssignMessage(JobMessage):
@@ -146,7 +167,7 @@ class AssignMessage(JobMessage):
 class MergeMessage(JobMessage):
     """Words first_word to stop_word - 1. n_images : of the segment to be."""
 
-    channel: str
+    channel: Channel
     n_images: Annotated[int, Field(ge=0)]
     first_word: Annotated[int, Field(ge=0)]
     stop_word: Annotated[int, Field(ge=0)]
@@ -155,14 +176,28 @@ class MergeMessage(JobMessage):
 class JoinMessage(JobMessage):
     """`first_words` : of each range that was merged, ascending."""
 
-    channel: str
+    channel: Channel
     n_images: Annotated[int, Field(ge=0)]
     first_words: tuple[int, ...]
+
+
+@lru_cache(maxsize=4)
+def _search_of(path: str) -> SearchConfig:
+    """The search in a file, whose name tells its content: it is read once a process."""
+    try:
+        return SearchConfig.model_validate_json(read_text_file(Path(path)))
+    except (OSError, ValidationError) as error:
+        raise TaskFailed(f"The search {path} cannot be read ({error}). Is it shared?") from error
+
+
+def _read_search(search: object, info: ValidationInfo) -> object:
+    return _search_of(_localised(search, info)) if isinstance(search, str) else search
 
 
 class LocateMessage(Message):
     """`query` is the photo's name as the user gave it, `path` where it is read.
 
+    search : or a file that holds it: a polygon would travel with every photo of a batch.
     plain : search by the baseline, a bag of words, instead.
     """
 
@@ -170,7 +205,7 @@ class LocateMessage(Message):
     generation: int
     query: str
     path: SharedPath
-    search: SearchConfig
+    search: Annotated[SearchConfig, BeforeValidator(_read_search)]
     plain: bool = False
 
 

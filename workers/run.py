@@ -3,12 +3,17 @@
 import os
 import resource
 import signal
+import socket
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from redis import Redis, RedisError
+from celery.signals import worker_shutting_down
+from redis import RedisError
+
+from workers.presence import Presence, announce
+from workers.server import connect, point_at
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -44,16 +49,30 @@ def run_worker(
     from retrieval.warm import compile_search_kernels
     from workers import tasks  # noqa: F401 - registers the tasks before processes are forked
     from workers.app import app
+    from workers.messages import our_version
 
     cv2.setNumThreads(1)
     faiss.omp_set_num_threads(1)
     compile_kernels()
     compile_search_kernels()
-    app.conf.update(broker_url=broker_url, result_backend=broker_url)
+    point_at(app, broker_url)
+    announce(
+        connect(broker_url),
+        Presence(
+            name=f"{name}@{socket.gethostname()}",
+            host=socket.gethostname(),
+            pid=os.getpid(),
+            processes=n_processes,
+            queues=tuple(queues),
+            version=our_version(),
+        ),
+    )
+    worker_shutting_down.connect(_be_ended_by_the_next, weak=False)
     if with_parent:
         threading.Thread(target=_stop_with_parent, args=(broker_url,), daemon=True).start()
     app.worker_main(
         [
+            "--quiet",  # no banner among the lines of the log
             "worker",
             f"--queues={','.join(queues)}",
             f"--concurrency={n_processes}",
@@ -65,10 +84,16 @@ def run_worker(
     )
 
 
+def _be_ended_by_the_next(how: str, **_: object) -> None:
+    """A second SIGTERM ends what the first lets finish; Celery would not heed it."""
+    if how == "Warm":
+        signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGQUIT))
+
+
 def _stop_with_parent(broker_url: str) -> None:
     """A coordinator that was killed closes our stdin: end its server, and with it ourselves."""
     while os.read(0, 1):  # unbuffered: forked processes close sys.stdin, whose lock we would hold
         pass
     with suppress(RedisError):  # already gone
-        Redis.from_url(broker_url.replace("redis+socket://", "unix://")).shutdown(nosave=True)
+        connect(broker_url).shutdown(nosave=True)
     os.killpg(os.getpgid(0), signal.SIGKILL)

@@ -6,43 +6,40 @@ from functools import wraps
 from typing import Any, TypeVar
 
 from celery import Task
+from celery.exceptions import Ignore
 from celery.signals import task_postrun
+from redis import RedisError
 
-from contracts.errors import Refused
+from contracts.errors import Cancelled, Refused
 from contracts.records import Receipt
+from index.control import read_wish
+from index.jobs import JobFolder
 from workers import messages
 from workers.app import app
-from workers.lease import LEASE_S, RENEWALS, lease, who
-from workers.messages import Envelope, Message
+from workers.lease import LEASE_S, RENEWALS, GivenUp, Withdrawn, lease, release, who
+from workers.messages import Envelope, JobMessage, Message, our_version
+from workers.presence import listening, processes_on
 from workers.roots import Roots, roots_here
 from workers.stages.assign import assign_shard
-from workers.stages.extract import extract_shard
+from workers.stages.extract import extract_shard, probe_rows
 from workers.stages.join import join_channel
 from workers.stages.merge import merge_words
 from workers.stages.train import train_channel
 
+MOST_THREADS = 8
+"""Of one task, however many processes there are."""
+
 Json = dict[str, Any]
 Request = TypeVar("Request", bound=Message)
 
-LANDED_KEPT_S = 3600
-
-
-def landed_key(run_id: str) -> str:
-    """Where a coordinator hears of its tasks that have ended."""
-    return f"flaneur:landed:{run_id}"
-
 
 @task_postrun.connect
-def _tell(task_id: str, **_: object) -> None:
-    """The result is stored: wake the coordinator that waits for it."""
-    key = landed_key(task_id.split(".", 1)[0])
-    pipeline = app.backend.client.pipeline(transaction=False)
-    pipeline.lpush(key, task_id)
-    pipeline.expire(key, LANDED_KEPT_S)
-    pipeline.execute()
+def _end(task_id: str, **_: object) -> None:
+    """The result is stored: the coordinator may have it."""
+    release(app.backend.client, task_id)
 
 
-def _task(
+def task(
     name: str, kind: type[Request]
 ) -> Callable[[Callable[[Request, Roots], Json]], Callable[[Request, Roots], Json]]:
     """Register a function of one request as the task `flaneur.<name>`, run under its lease."""
@@ -52,63 +49,86 @@ def _task(
         @wraps(work)
         def run(self: Task, envelope: object) -> Json:
             started = time.perf_counter()
+            told: Json
             try:
                 sent = Envelope.opened(envelope)
                 roots = Roots(sent.roots, roots_here())
                 with lease(app.backend.client, self.request.id, sent.lease_s):
-                    value = work(kind.parse(sent.message, roots), roots)
-            except Refused:
+                    told = {"value": work(kind.parse(sent.message, roots), roots)}
+            except Withdrawn as error:
+                raise Ignore from error
+            except (Refused, Cancelled) as error:
                 time.sleep(_pause(envelope))
-                raise
-            return {"value": value, "worker": who(), "seconds": time.perf_counter() - started}
+                told = {"refused": str(error)}
+            except MemoryError as error:  # Celery would end the whole worker
+                raise GivenUp("it needs more memory than its worker may have.") from error
+            return {**told, "worker": who(), "seconds": time.perf_counter() - started}
 
         return work
 
     return register
 
 
-@_task("extract", messages.ExtractMessage)
+@task("extract", messages.ExtractMessage)
 def extract(request: messages.ExtractMessage, roots: Roots) -> Json:
-    return _brief(extract_shard(request.folder(), request.shard, roots.local))
+    job = _job(request)
+    done = job.valid_receipt("extract", f"{request.shard:06d}")
+    return _brief(done or extract_shard(job, request.shard, roots.local), anew=done is None)
 
 
-@_task("train", messages.TrainMessage)
+@task("probe", messages.ProbeMessage)
+def probe(request: messages.ProbeMessage, roots: Roots) -> Json:
+    rows = range(request.first_row, request.stop_row)
+    probe_rows(_job(request), request.shard, rows, roots.local)
+    return {}
+
+
+@task("train", messages.TrainMessage)
 def train(request: messages.TrainMessage, _: Roots) -> Json:
-    return _brief(train_channel(request.folder(), request.channel))
+    job = _job(request)
+    done = job.valid_receipt("train", request.channel)
+    if done is not None:
+        return _brief(done, anew=False)
+    n_threads = _threads_each(len(job.read_plan().config.features.channels()))
+    return _brief(train_channel(job, request.channel, n_threads))
 
 
-@_task("assign", messages.AssignMessage)
+@task("assign", messages.AssignMessage)
 def assign(request: messages.AssignMessage, _: Roots) -> Json:
-    return _brief(assign_shard(request.folder(), request.shard, request.first_image_id))
+    job, first_id = _job(request), request.first_image_id
+    done = job.assigned(request.shard, job.words_digest(job.read_plan().config.features.channels()))
+    if done is not None and done.counts["first_image_id"] == first_id:
+        return _brief(done, anew=False)
+    return _brief(assign_shard(job, request.shard, first_id))
 
 
-@_task("merge", messages.MergeMessage)
+@task("merge", messages.MergeMessage)
 def merge(request: messages.MergeMessage, _: Roots) -> Json:
     words = range(request.first_word, request.stop_word)
-    return _brief(merge_words(request.folder(), request.channel, words, request.n_images))
+    return _brief(merge_words(_job(request), request.channel, words, request.n_images))
 
 
-@_task("join", messages.JoinMessage)
+@task("join", messages.JoinMessage)
 def join(request: messages.JoinMessage, _: Roots) -> Json:
-    folder, pieces = request.folder(), request.first_words
-    return _brief(join_channel(folder, request.channel, pieces, request.n_images))
+    job, pieces = _job(request), request.first_words
+    return _brief(join_channel(job, request.channel, pieces, request.n_images))
 
 
-@_task("locate", messages.LocateMessage)
+@task("locate", messages.LocateMessage)
 def locate(request: messages.LocateMessage, _: Roots) -> Json:
     from workers.stages.locate import locate_photo  # geopandas and pyproj stay out of extraction
 
     return locate_photo(request)
 
 
-@_task("judge", messages.JudgeMessage)
+@task("judge", messages.JudgeMessage)
 def judge(request: messages.JudgeMessage, _: Roots) -> Json:
     from workers.stages.judge import judge_photo
 
     return judge_photo(request)
 
 
-@_task("rehearse", messages.RehearseMessage)
+@task("rehearse", messages.RehearseMessage)
 def rehearse(request: messages.RehearseMessage, _: Roots) -> Json:
     from workers.stages.rehearse import rehearse_photo
 
@@ -121,5 +141,31 @@ def _pause(envelope: object) -> float:
     return min(float(lease_s) if isinstance(lease_s, int | float) else 0.0, LEASE_S) / RENEWALS
 
 
-def _brief(receipt: Receipt) -> Json:
-    return {"stage": receipt.stage, "key": receipt.key, "counts": receipt.counts}
+def _job(request: JobMessage) -> JobFolder:
+    """The folder of a job that is still wanted.
+
+    Raises
+    ------
+    Cancelled : it is not. Refused : as `JobMessage.folder`.
+    """
+    job = request.folder()
+    if read_wish(job.path) == "cancel":
+        raise Cancelled(f"job {job.job} is cancelled.")
+    return job
+
+
+def _threads_each(n_tasks: int) -> int:
+    """Threads for each of the few tasks of a stage, where more processes would only wait for it.
+
+    One where the server is away.
+    """
+    try:
+        processes = processes_on(listening(app.backend.client), ("train",), our_version())
+    except RedisError:
+        return 1
+    return min(max(processes // n_tasks, 1), MOST_THREADS)
+
+
+def _brief(receipt: Receipt, *, anew: bool = True) -> Json:
+    """What the coordinator needs to know. anew : it was not done already."""
+    return {"stage": receipt.stage, "key": receipt.key, "counts": receipt.counts, "anew": anew}

@@ -14,15 +14,9 @@ from benchmarks.fusion.word_use import WordUse
 from contracts.config import CodebookConfig, Detector, FeatureConfig
 from contracts.records import PosedImage, Postings
 from coordinator.intake import read_surveys
-from retrieval.codebooks import (
-    SampleReservoir,
-    WordSearcher,
-    build_search,
-    n_words_for,
-    sample_keys,
-    train_codebook,
-)
+from retrieval.codebooks import WordSearcher, build_search, n_words_for, train_codebook
 from retrieval.postings import build_postings
+from retrieval.sampling import SampleReservoir, sample_keys
 from survey import ReadOptions
 from workers.stages.extract import image_features
 

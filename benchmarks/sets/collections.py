@@ -19,7 +19,7 @@ from coordinator.demo import CONFIG as DEMO_CONFIG
 from coordinator.engine import Engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
-from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
+from coordinator.plan import SMALLEST_SHARD, make_plan
 from coordinator.querying import Rules, rehearse_queries
 from coordinator.truth import JudgedQuery, read_truth
 from index.opened import OpenedIndex
@@ -68,7 +68,7 @@ def rehearsed_sets(data: Path, folder: Path, engine: Engine) -> Iterator[Rehears
 def _real(data: Path, folder: Path, engine: Engine) -> Rehearsed:
     sources = [(name, data / path) for name, path in _SOURCES]
     options = ReadOptions(no_pose=True, exclude=_QUERIES)
-    index = _indexed(folder / "index", sources, options, IndexConfig(), DEFAULT_SHARD_SIZE, engine)
+    index = _indexed(folder / "index", sources, options, IndexConfig(), SMALLEST_SHARD, engine)
     queries: list[JudgedQuery] = []
     sets: list[str] = []
     for name in ("kth-buildings", "wxbs", "budaors"):

@@ -2,14 +2,29 @@
 
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coordinator.cli.lists import SOME_SKIPPED, Broker, Workers
+from coordinator.cli.announcing import (
+    HERE,
+    MetricsAddress,
+    MetricsPort,
+    announced,
+    tell_what_it_did,
+)
+from coordinator.cli.lists import (
+    JOB_PRIORITY,
+    SOME_SKIPPED,
+    Broker,
+    OwnIndex,
+    Priority,
+    Workers,
+)
 from coordinator.cli.outputs import utf_8
-from coordinator.cli.show import bars, complain, list_skipped, tell
+from coordinator.cli.show import complain, list_skipped, tell
 from coordinator.cli.survey_options import ShardSize, SurveyPath, reads_a_survey, survey_name
 
 if TYPE_CHECKING:  # geopandas and faiss are imported when the verb runs
@@ -24,7 +39,7 @@ NAME = "add"
 @reads_a_survey
 def command(
     survey: SurveyPath,
-    index: Annotated[Path, typer.Argument(help="The index.")],
+    index: OwnIndex,
     reading: "ReadOptions",
     name: Annotated[
         str,
@@ -35,6 +50,9 @@ def command(
     shard_size: ShardSize = None,
     workers: Workers = None,
     broker: Broker = None,
+    priority: Priority = JOB_PRIORITY,
+    metrics_port: MetricsPort = None,
+    metrics_address: MetricsAddress = HERE,
     as_json: Annotated[bool, typer.Option("--json", help="Report as JSON on stdout.")] = False,
 ) -> int:
     """Add the images of a survey that an index does not have. Run again, it goes on.
@@ -44,8 +62,7 @@ def command(
     again.
     """
     from coordinator.adding import find_new, plan_addition, run_addition
-    from coordinator.engine import running_engine
-    from coordinator.plan import DEFAULT_SHARD_SIZE
+    from coordinator.engine import JOB_QUEUES, running_engine
     from index.opened import OpenedIndex
 
     started = time.perf_counter()
@@ -56,11 +73,15 @@ def command(
         tell(note)
     report = None
     if new.intake.images:
-        job, plan = plan_addition(opened, new.intake, shard_size or DEFAULT_SHARD_SIZE)
+        job, plan = plan_addition(opened, new.intake, shard_size)
+        new = replace(new, intake=new.intake.without_images())
         tell(f"{plan.n_images} new images in {plan.n_shards} shards; job {plan.job}")
-        engine = running_engine(broker, workers)
-        with bars() as progress:
-            report = run_addition(job, plan, new.intake, engine, progress)
+        with announced(metrics_port, metrics_address) as watchers:
+            engine = running_engine(
+                broker, workers, JOB_QUEUES, priority=priority, listen=watchers.listen
+            )
+            report = run_addition(job, plan, new.intake, engine, watchers.progress)
+        tell_what_it_did(job)
     skipped = new.intake.skipped if report is None else report.skipped
     for warning in () if report is None else report.warnings:
         complain(warning)
@@ -82,7 +103,7 @@ def _summary(
     return {
         "generation": generation.number,
         "images": generation.n_live,
-        "added": len(new.intake.images) - unreadable,
+        "added": len(new.intake.survey_names) - unreadable,
         "known": new.n_known,
         "extracted_now": 0 if report is None else report.images_extracted,
         "skipped": [{"uri": each.uri, "reason": each.reason} for each in skipped],

@@ -1,20 +1,26 @@
 """`flaneur compact`: one segment of all images that are left."""
 
 import json
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from coordinator.cli.lists import Broker, Workers
+from coordinator.cli.announcing import (
+    HERE,
+    MetricsAddress,
+    MetricsPort,
+    announced,
+    tell_what_it_did,
+)
+from coordinator.cli.lists import JOB_PRIORITY, Broker, OwnIndex, Priority, Workers
 from coordinator.cli.outputs import utf_8
-from coordinator.cli.show import bars, tell
+from coordinator.cli.show import tell
 
 NAME = "compact"
 
 
 def command(
-    index: Annotated[Path, typer.Argument(help="The index.")],
+    index: OwnIndex,
     prune: Annotated[
         bool,
         typer.Option(
@@ -26,6 +32,9 @@ def command(
     ] = False,
     workers: Workers = None,
     broker: Broker = None,
+    priority: Priority = JOB_PRIORITY,
+    metrics_port: MetricsPort = None,
+    metrics_address: MetricsAddress = HERE,
     as_json: Annotated[bool, typer.Option("--json", help="Report as JSON on stdout.")] = False,
 ) -> None:
     """Make one segment of all images that were not removed. Run again, it goes on.
@@ -39,8 +48,13 @@ def command(
     from coordinator.engine import running_engine
 
     root = index.absolute()
-    with bars() as progress:
-        report = compact(root, running_engine(broker, workers, ("merge",)), progress)
+    with announced(metrics_port, metrics_address) as watchers:
+        engine = running_engine(
+            broker, workers, ("merge",), priority=priority, listen=watchers.listen
+        )
+        report = compact(root, engine, watchers.progress)
+    if report.job is not None:
+        tell_what_it_did(report.job)
     pruned = pruning.prune(root) if prune else None
     before, after = report.before, report.generation
     summary = {

@@ -22,6 +22,7 @@ from coordinator.cli.lists import (
     fitted_search,
     search_config,
 )
+from coordinator.cli.opening import opened_index
 from coordinator.cli.outputs import result_folder, utf_8
 from coordinator.cli.show import bars, complain
 
@@ -57,12 +58,13 @@ def command(
     from coordinator.export.files import write_whole
     from coordinator.querying import judge_queries
     from coordinator.truth import truth_of_index
-    from index.opened import OpenedIndex
 
     search = search_config(pair, k, vote, weights, descriptors, top=10)
-    opened = OpenedIndex(index.absolute())
+    opened = opened_index(index)
     search = fitted_search(search, vote, opened.config.features)
     out = None if out is None else result_folder(out)
+    if tables and not isinstance(index, Path):
+        raise BadConfig("--tables keeps files in the index's folder: name that, not its URL")
     if tables and out is None:
         raise BadConfig("--tables writes several files; name a folder with --out")
     queries = truth_of_index(opened, truth, root)

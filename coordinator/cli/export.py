@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from coordinator.cli.lists import SOME_SKIPPED
+from coordinator.cli.lists import SOME_SKIPPED, SeenIndex
+from coordinator.cli.opening import opened_index
 from coordinator.cli.outputs import result_file, utf_8
 from coordinator.cli.show import bars, list_skipped, tell
 from coordinator.cli.survey_options import (
@@ -73,14 +74,13 @@ def mcap(
 
 
 def stac(
-    index: Annotated[Path, typer.Argument(help="The index.")],
+    index: SeenIndex,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder.")],
 ) -> None:
     """Every image of an index as a STAC item."""
     from coordinator.export.stac_folder import write_stac
-    from index.opened import OpenedIndex
 
-    opened = OpenedIndex(index.absolute())
+    opened = opened_index(index)
     folder = folder.absolute()
     with bars() as progress:
         progress.begin("stac", opened.n_live, 0)

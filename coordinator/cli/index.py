@@ -16,15 +16,26 @@ from contracts.config import (
     IndexConfig,
 )
 from contracts.errors import BadConfig
+from contracts.places import Place, place_of
+from coordinator.cli.announcing import (
+    HERE,
+    MetricsAddress,
+    MetricsPort,
+    announced,
+    tell_what_it_did,
+)
 from coordinator.cli.lists import (
+    JOB_PRIORITY,
     SOME_SKIPPED,
     Broker,
     MaxFrames,
+    OwnIndex,
+    Priority,
     Workers,
     frame_limits,
     names_among,
 )
-from coordinator.cli.show import bars, complain, list_skipped, tell
+from coordinator.cli.show import complain, list_skipped, tell
 from coordinator.cli.survey_options import Also, ShardSize, SurveyPath, reads_a_survey, survey_name
 
 if TYPE_CHECKING:  # reading a survey imports much
@@ -49,7 +60,7 @@ MaxWords = Annotated[
 @reads_a_survey
 def command(
     survey: SurveyPath,
-    index: Annotated[Path, typer.Argument(help="Where the index goes.")],
+    index: OwnIndex,
     reading: "ReadOptions",
     also: Also = None,
     detectors: Detectors = None,
@@ -68,14 +79,17 @@ def command(
     shard_size: ShardSize = None,
     workers: Workers = None,
     broker: Broker = None,
+    priority: Priority = JOB_PRIORITY,
+    metrics_port: MetricsPort = None,
+    metrics_address: MetricsAddress = HERE,
     as_json: Annotated[bool, typer.Option("--json", help="Report as JSON on stdout.")] = False,
 ) -> int:
     """Index a survey. Run again, it does only what is missing."""
     from coordinator.adding import before_replacing
-    from coordinator.engine import running_engine
+    from coordinator.engine import JOB_QUEUES, running_engine
     from coordinator.indexing import run_job
     from coordinator.intake import read_surveys
-    from coordinator.plan import DEFAULT_SHARD_SIZE, make_plan
+    from coordinator.plan import make_plan
     from coordinator.reusing import config_of_words, misfit, take_over
     from index.importing import words_to_import
     from index.word_sets import open_words
@@ -96,16 +110,20 @@ def command(
         words = words_to_import(root, source, config.features.channels())
     started = time.perf_counter()
     intake = read_surveys([("", survey.absolute()), *map(named_survey, also or ())], reading)
-    job, plan = make_plan(root, intake, config, shard_size or DEFAULT_SHARD_SIZE, words)
+    job, plan = make_plan(root, intake, config, shard_size, words)
     if source is not None and words is not None:
         take_over(job, source, words)
     for note in intake.notes:
         tell(note)
     if warning := before_replacing(job, plan, intake):
         complain(warning)
-    tell(f"{len(intake.images)} images in {plan.n_shards} shards; job {plan.job}")
-    with bars() as progress:
-        report = run_job(job, plan, intake, running_engine(broker, workers), progress)
+    intake = intake.without_images()
+    tell(f"{plan.n_images} images in {plan.n_shards} shards; job {plan.job}")
+    with announced(metrics_port, metrics_address) as watchers:
+        engine = running_engine(
+            broker, workers, JOB_QUEUES, priority=priority, listen=watchers.listen
+        )
+        report = run_job(job, plan, intake, engine, watchers.progress)
     generation = report.generation
     for warning in report.warnings:
         complain(warning)
@@ -115,6 +133,8 @@ def command(
         if warning:
             complain(warning)
     list_skipped(report.skipped, str(job.path / "skipped.json"))
+    if report.images_extracted:
+        tell_what_it_did(job)
     seconds = time.perf_counter() - started
     summary = {
         "generation": generation.number,
@@ -168,7 +188,7 @@ def _or_all(text: str | None, known: Sequence[str]) -> str:
     return ",".join(known) if text is None else text
 
 
-def named_survey(text: str) -> tuple[str, Path]:
+def named_survey(text: str) -> tuple[str, Place]:
     """Read `NAME=SURVEY` of --also.
 
     Raises
@@ -179,7 +199,7 @@ def named_survey(text: str) -> tuple[str, Path]:
     refused = f"--also takes NAME=SURVEY, with no / in NAME; got {text!r}"
     if not (separator and name and path):
         raise BadConfig(refused)
-    return survey_name(name, refused), Path(path).absolute()
+    return survey_name(name, refused), place_of(path).absolute()
 
 
 def _sentence(summary: dict[str, object], root: Path) -> str:

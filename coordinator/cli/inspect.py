@@ -10,7 +10,9 @@ from rich.table import Table
 
 from contracts.config import DETECTORS, FeatureConfig, IndexConfig
 from contracts.errors import BadConfig
-from coordinator.cli.lists import MaxFrames, frame_limits, names_among
+from contracts.places import Place
+from coordinator.cli.lists import MaxFrames, frame_limits, given_place, names_among
+from coordinator.cli.opening import opened_index
 from coordinator.cli.outputs import result_file, utf_8
 from coordinator.cli.show import stdout, tell
 
@@ -26,8 +28,12 @@ def command(
     photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="The photo to look at.")],
     out: Annotated[Path, typer.Option(help="The picture: a .png or .jpg file.")],
     index: Annotated[
-        Path | None,
-        typer.Option(help="See and choose as this index does; default: as a new one would."),
+        Place | None,
+        typer.Option(
+            parser=given_place,
+            metavar="INDEX",
+            help="See and choose as this index does; default: as a new one would.",
+        ),
     ] = None,
     detectors: Annotated[
         str | None, typer.Option(help=f"Which to run; default: {','.join(DETECTORS)}.")
@@ -48,7 +54,6 @@ def command(
     from coordinator.export.files import write_whole
     from coordinator.export.inspection import picture
     from coordinator.inspecting import NoIndex, inspect_photo
-    from index.opened import OpenedIndex
     from retrieval.features import compile_kernels
 
     suffix = _picture_suffix(out)
@@ -56,7 +61,7 @@ def command(
     if index is None:
         seen_as: Configured = NoIndex(IndexConfig(features=_features(detectors, max_frames)))
     elif detectors is None and max_frames is None:
-        seen_as = OpenedIndex(index.absolute())
+        seen_as = opened_index(index)
     else:
         raise BadConfig(
             "--index brings its own detectors and number of frames: leave --detectors and "

@@ -16,6 +16,7 @@ from contracts.config import (
 )
 from contracts.config import Vote as VoteName
 from contracts.errors import BadConfig
+from contracts.places import Place, is_url, place_of
 
 DEFAULT_VOTE: VoteName = SearchConfig().vote
 
@@ -33,7 +34,53 @@ Broker = Annotated[
 Workers = Annotated[
     int | None, typer.Option(min=1, help="Local worker processes; default: one a core.")
 ]
-IndexFolder = Annotated[Path, typer.Option("--index", help="The index to search.")]
+JOB_PRIORITY = 7
+Priority = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        max=9,
+        help="Among the jobs of a broker: 1 first, 9 last; `locate` goes before all of them.",
+    ),
+]
+
+
+def given_place(text: str) -> Place:
+    """Read a path or a URL; typer makes a path of neither."""
+    try:
+        return place_of(text)
+    except BadConfig as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def own_folder(text: str) -> Path:
+    """Read the path of an index that is to be changed."""
+    if is_url(text):
+        raise typer.BadParameter(
+            f"{text} is in a store, and an index is changed in a folder. Name the folder, and "
+            f"then publish it: flaneur publish INDEX {text}"
+        )
+    return Path(text)
+
+
+IndexFolder = Annotated[
+    Place,
+    typer.Option(
+        "--index",
+        parser=given_place,
+        metavar="INDEX",
+        help="The index to search: its folder, or the URL that it was published to.",
+    ),
+]
+SeenIndex = Annotated[
+    Place,
+    typer.Argument(
+        parser=given_place,
+        metavar="INDEX",
+        help="The index: its folder, or the URL that it was published to.",
+    ),
+]
+OwnIndex = Annotated[Path, typer.Argument(parser=own_folder, metavar="INDEX", help="The index.")]
 Truth = Annotated[
     Path,
     typer.Option(

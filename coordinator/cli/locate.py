@@ -1,6 +1,7 @@
 """`flaneur locate`: photos become places, as GeoJSON and in other formats."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,7 +20,9 @@ from coordinator.cli.lists import (
     fitted_search,
     search_config,
 )
+from coordinator.cli.opening import opened_index
 from coordinator.cli.outputs import result_file
+from coordinator.cli.photo_options import Sources
 from coordinator.cli.show import bars, complain, tell
 from coordinator.cli.where_options import (
     Bbox,
@@ -39,14 +42,15 @@ NAME = "locate"
 
 
 def command(
-    photos: Annotated[list[str], typer.Argument(metavar="PHOTO...", help="Photos to locate.")],
+    sources: Sources,
     index: IndexFolder,
     out: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Results, in the format that the name ends in: .geojson, .gpkg, .fgb, .parquet "
-            "or .kml; may be given several times. Default: GeoJSON on stdout.",
+            help="Results, in the format that the name ends in: .geojson, .geojsons (a text "
+            "sequence, RFC 8142), .gpkg, .fgb, .parquet or .kml; may be given several times. "
+            "Default: GeoJSON on stdout.",
         ),
     ] = None,
     top: Annotated[int, typer.Option(help="Matches a photo.")] = 10,
@@ -66,7 +70,9 @@ def command(
     broker: Broker = None,
 ) -> int:
     """Find where photos were taken."""
-    from coordinator.engine import running_engine
+    from coordinator.batches.at_once import photos_at_hand, seen_by_workers
+    from coordinator.broker import broker_url
+    from coordinator.engine import available_cores, running_engine
     from coordinator.export.geojson import encoded, provenance
     from coordinator.export.results import (
         features_of,
@@ -75,23 +81,27 @@ def command(
         write_results,
     )
     from coordinator.querying import locate_photos, searched
-    from index.opened import OpenedIndex
 
     search = search_config(pair, k, vote, weights, descriptors, top)
-    opened = OpenedIndex(index.absolute())
+    opened = opened_index(index)
     search = fitted_search(search, vote, opened.config.features)
-    photos = list(dict.fromkeys(photos))  # globs overlap; a feature's id is of its photo's name
-    outs = [result_file(each, map(Path, photos)) for each in out or ()]
-    refuse_unknown(outs)
-    refuse_unwritable(outs)
+    refuse_unknown([result_file(each) for each in out or ()])
+    refuse_unwritable([result_file(each) for each in out or ()])
     where = where_of(
         opened.generation, bbox, within, since, until, heading, surveys=survey, uris=uri
     )
     search = search.model_copy(update={"where": where})
     about = {**provenance(opened), "searched": searched(opened, where)}
     tally = _Tally()
-    count = min(workers or len(photos), len(photos)) if broker is None else None
-    with running_engine(broker, _at_most_cores(count), ("locate",)) as engine, bars() as progress:
+    with ExitStack() as stack:
+        progress = stack.enter_context(bars())
+        photos = stack.enter_context(
+            photos_at_hand(sources, seen_by_workers(index, broker_url(broker)), progress)
+        )
+        inputs = [Path(each) for each in (*sources, *(photo.path for photo in photos)) if each]
+        outs = [result_file(each, inputs) for each in out or ()]
+        count = min(workers or len(photos), len(photos), available_cores())
+        engine = stack.enter_context(running_engine(broker, count, ("locate",)))
         progress.begin("locate", len(photos), 0)
         answers = tally.count(
             locate_photos(
@@ -134,9 +144,3 @@ class _Tally:
             if answer.error is not None:
                 self.failed.append((answer.query, answer.error))
             yield answer
-
-
-def _at_most_cores(count: int | None) -> int | None:
-    from coordinator.engine import available_cores
-
-    return None if count is None else min(count, available_cores())

@@ -11,6 +11,7 @@ import typer
 from contracts.errors import FlaneurError, WrongInput
 from coordinator.cli import (
     add,
+    batch,
     codebook,
     compact,
     demo,
@@ -19,8 +20,10 @@ from coordinator.cli import (
     export,
     index,
     inspect,
+    job,
     locate,
     plan,
+    publish,
     remove,
     rollback,
     status,
@@ -84,10 +87,10 @@ for verb in (demo, index, add, compact):
     main.command(verb.NAME)(_guarded(verb.command, RESUMED))
 for verb in (
     *(doctor, plan, locate, inspect, train, evaluate),
-    *(remove, rollback, status, verify, worker),
+    *(remove, rollback, publish, status, verify, worker),
 ):
     main.command(verb.NAME)(_guarded(verb.command))
-for group in (export, codebook):
+for group in (batch, job, export, codebook):
     verbs = typer.Typer(no_args_is_help=True, help=group.HELP)
     for name, command in group.COMMANDS.items():
         verbs.command(name)(_guarded(command))

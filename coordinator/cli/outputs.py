@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from contracts.errors import WrongInput
+from contracts.places import Place
 
 
 def utf_8(text: str) -> bytes:
@@ -11,7 +12,7 @@ def utf_8(text: str) -> bytes:
     return text.encode("utf-8", "backslashreplace")
 
 
-def result_file(out: Path, inputs: Iterable[Path] = ()) -> Path:
+def result_file(out: Path, inputs: Iterable[Place] = ()) -> Path:
     """Where `out` is written: the file itself, for a symbolic link what it leads to.
 
     Raises
@@ -24,7 +25,7 @@ def result_file(out: Path, inputs: Iterable[Path] = ()) -> Path:
             f"--out {out} is {'a folder' if file.is_dir() else 'no regular file'}; name a file."
         )
     for each in inputs:
-        if each.resolve() == file:
+        if isinstance(each, Path) and each.resolve() == file:
             raise WrongInput(f"--out {out} is one of the inputs; it would be lost. Name another.")
     _refuse_under_a_file(out, file)
     return file
@@ -44,13 +45,15 @@ def result_folder(out: Path) -> Path:
     return folder
 
 
-def refuse_inside(survey: Path, out: Path, option: str) -> None:
+def refuse_inside(survey: Place, out: Path, option: str) -> None:
     """A picture in a survey's folder would be an image of the survey the next time.
 
     Raises
     ------
     WrongInput : `out` lies in the folder of `survey`, which may be a pose table in it.
     """
+    if not isinstance(survey, Path):
+        return
     recording = survey.suffix.lower() == ".mcap"
     folder = survey.parent if survey.is_file() and not recording else survey
     if out.resolve().is_relative_to(folder.resolve()):

@@ -2,7 +2,6 @@
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,6 +13,7 @@ from contracts.config import (
     FeatureConfig,
     IndexConfig,
 )
+from contracts.places import Place
 from coordinator.cli.index import named_survey
 from coordinator.cli.lists import SOME_SKIPPED, MaxFrames, frame_limits, names_among
 from coordinator.cli.outputs import utf_8
@@ -56,7 +56,7 @@ def command(
     from coordinator.forecast.sample import draw, extract_sample
     from coordinator.forecast.yardstick import idle_as_a_worker, slowness
     from coordinator.intake import read_surveys
-    from coordinator.plan import DEFAULT_SHARD_SIZE
+    from coordinator.plan import shard_size_for
 
     config = IndexConfig(
         features=FeatureConfig.of(
@@ -66,7 +66,7 @@ def command(
         ),
         codebooks=CodebookConfig.of(max_words=max_words),
     )
-    sources: list[tuple[str, Path]] = [("", survey.absolute()), *map(named_survey, also or ())]
+    sources: list[tuple[str, Place]] = [("", survey.absolute()), *map(named_survey, also or ())]
     machine = Machine(idle=idle_as_a_worker(), slowness=slowness())
     intake = read_surveys(sources, reading)
     for note in intake.notes:
@@ -79,7 +79,7 @@ def command(
         found,
         config,
         len(intake.images),
-        shard_size or DEFAULT_SHARD_SIZE,
+        shard_size or shard_size_for(len(intake.images)),
         sorted(set(workers or WORKERS)),
         machine,
     )

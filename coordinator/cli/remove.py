@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.cli.lists import OwnIndex
 from coordinator.cli.outputs import utf_8
 from coordinator.cli.show import MAX_LISTED, bars, tell
 from coordinator.cli.where_options import (
@@ -25,7 +26,7 @@ NAME = "remove"
 
 
 def command(
-    index: Annotated[Path, typer.Argument(help="The index.")],
+    index: OwnIndex,
     uris: Annotated[
         list[str] | None, typer.Argument(metavar="URI", help="Images, as results name them.")
     ] = None,

@@ -1,11 +1,11 @@
 """`flaneur rollback`: a former generation becomes the live one again."""
 
 import json
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from coordinator.cli.lists import OwnIndex
 from coordinator.cli.outputs import utf_8
 from coordinator.cli.show import tell
 
@@ -13,7 +13,7 @@ NAME = "rollback"
 
 
 def command(
-    index: Annotated[Path, typer.Argument(help="The index.")],
+    index: OwnIndex,
     to: Annotated[
         int | None, typer.Option(min=1, help="Its number; default: the one before the live one.")
     ] = None,

@@ -1,8 +1,11 @@
 """What a person sees: progress on stderr, plain lines where that is not a terminal."""
 
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import (
@@ -19,6 +22,9 @@ from rich.progress import (
 from contracts.records import Skipped
 from coordinator.export.harmless import harmless
 
+if TYPE_CHECKING:  # imported where programs read what is told
+    from structlog.stdlib import BoundLogger
+
 MAX_LISTED = 20
 
 stderr = Console(stderr=True, highlight=False)
@@ -27,12 +33,31 @@ stdout = Console(highlight=False)
 
 def complain(message: str) -> None:
     """An error or a warning, for a person."""
+    if _logs_json():
+        _log().warning(message)
+        return
     stderr.print(_shown(message), style="red", markup=False, soft_wrap=True)
 
 
 def tell(message: str) -> None:
     """A line that is not a result."""
+    if _logs_json():
+        _log().info(message)
+        return
     stderr.print(_shown(message), markup=False, soft_wrap=True)
+
+
+def _logs_json() -> bool:
+    """Whether programs read what is told here (workers/logs.py)."""
+    return os.environ.get("FLANEUR_LOG") == "json"
+
+
+@cache
+def _log() -> "BoundLogger":
+    from workers.logs import install, logger
+
+    install("json")
+    return logger()
 
 
 def _shown(message: str) -> str:
@@ -65,7 +90,7 @@ class Bars:
 @contextmanager
 def bars() -> Iterator[Bars]:
     """Progress for as long as the block runs."""
-    if not sys.stderr.isatty():
+    if not sys.stderr.isatty() or _logs_json():
         yield Bars(None)
         return
     columns = (

@@ -2,12 +2,16 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contracts.errors import BadConfig, BadIndex
+from contracts.places import Place
+from coordinator.cli.lists import SeenIndex
+from coordinator.cli.opening import folder_of
 from coordinator.cli.outputs import utf_8
 from coordinator.cli.show import complain
 from coordinator.cli.tables import print_line, print_table
@@ -21,7 +25,15 @@ DAMAGED = 2
 
 
 def command(
-    index: Annotated[Path, typer.Argument(help="The index.")],
+    index: SeenIndex,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Show how its jobs and batches go, until Ctrl-C."),
+    ] = False,
+    broker: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="With --watch: also tell who listens at this broker."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="As JSON on stdout.")] = False,
 ) -> int:
     """What an index holds: generations, segments, words, unfinished jobs, bytes, health.
@@ -29,14 +41,32 @@ def command(
     Changes nothing, and may run while another process writes. Of files only the sizes are
     compared; `flaneur verify` reads them. Exit code 2: the live generation is damaged.
     """
+    if watch:
+        _watch(index, broker, as_json)
+        return 0
     from coordinator.status import state_of
 
-    state = state_of(index.absolute())
+    held = folder_of(index)
+    state = replace(state_of(held.root), index=str(index.absolute()))
     if as_json:
         typer.echo(utf_8(json.dumps(asdict(state), ensure_ascii=False, allow_nan=False)))
     else:
         _print(state)
     return DAMAGED if state.faults else 0
+
+
+def _watch(index: Place, broker: str | None, as_json: bool) -> None:
+    from coordinator.cli.watching import present_at, watch
+
+    if not isinstance(index, Path):
+        raise BadConfig(
+            f"{index} is in a store, where no job works. Watch the folder that it was published "
+            "from."
+        )
+    root = index.absolute()
+    if not any((root / name).exists() for name in ("jobs", "batches", "CURRENT")):
+        raise BadIndex(f"{root} is no index, and none is being made there. Name an index.")
+    watch(root, present_at(broker), as_json)
 
 
 def _print(state: "IndexState") -> None:

@@ -11,12 +11,20 @@ import typer
 
 from contracts.config import North as NorthName
 from contracts.errors import BadConfig
+from contracts.places import Place
+from coordinator.cli.lists import given_place
 
 if TYPE_CHECKING:  # reading a survey imports much
     from survey import ReadOptions
 
 SurveyPath = Annotated[
-    Path, typer.Argument(help="A folder, a pose table, or an MCAP file; see docs/surveys.md.")
+    Place,
+    typer.Argument(
+        parser=given_place,
+        metavar="SURVEY",
+        help="A folder, a pose table, or an MCAP file, or its URL such as s3://bucket/folder; see "
+        "docs/surveys.md.",
+    ),
 ]
 Include = Annotated[list[str] | None, typer.Option(metavar="GLOB", help="Only uris like this.")]
 Exclude = Annotated[list[str] | None, typer.Option(metavar="GLOB", help="No uris like this.")]
@@ -71,7 +79,12 @@ Also = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=SURVEY", help="Another survey; its uris begin with NAME/."),
 ]
-ShardSize = Annotated[int | None, typer.Option(min=1, max=10_000, help="Images a task.")]
+ShardSize = Annotated[
+    int | None,
+    typer.Option(
+        min=1, max=10_000, help="Images a task; default: 8 to 128, by how many there are."
+    ),
+]
 
 
 def reading_options(

@@ -20,6 +20,7 @@ from coordinator.cli.lists import (
     fitted_search,
     search_config,
 )
+from coordinator.cli.opening import opened_index
 from coordinator.cli.outputs import result_file
 from coordinator.cli.show import bars, complain, tell
 
@@ -55,12 +56,16 @@ def command(
     from coordinator.training import train_model
     from coordinator.truth import truth_of_index
     from index.models import model_path, write_model
-    from index.opened import OpenedIndex
     from workers.stages.choose import KS
 
     variants = _variants(variant)
+    if out is None and not isinstance(index, Path):
+        raise BadConfig(
+            f"{index} is in a store, where no model is written: name a file with --out, or train "
+            "in the index's folder and publish it again"
+        )
     search = search_config("auto", "auto", vote, weights, descriptors, top=10)
-    opened = OpenedIndex(index.absolute())
+    opened = opened_index(index)
     search = fitted_search(search, vote, opened.config.features)
     out = None if out is None else result_file(out, (truth,))
     queries = truth_of_index(opened, truth, root)

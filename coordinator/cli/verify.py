@@ -1,11 +1,13 @@
 """`flaneur verify`: whether an index is still what was written, byte for byte, and makes sense."""
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from contracts.places import Place
+from coordinator.cli.lists import SeenIndex
+from coordinator.cli.opening import folder_of
 from coordinator.cli.outputs import utf_8
 from coordinator.cli.show import bars, complain, tell
 
@@ -18,7 +20,7 @@ DAMAGED = 2
 
 
 def command(
-    index: Annotated[Path, typer.Argument(help="The index.")],
+    index: SeenIndex,
     every: Annotated[
         bool, typer.Option("--all", help="All generations; default: the live one.")
     ] = False,
@@ -30,20 +32,20 @@ def command(
     """
     from index.verifying import verify
 
-    root = index.absolute()
+    held = folder_of(index)
     with bars() as progress:
-        verdict = verify(root, every, progress)
+        verdict = verify(held.root, every, progress)
     if as_json:
-        typer.echo(utf_8(json.dumps(_report(root, verdict), ensure_ascii=False)))
+        typer.echo(utf_8(json.dumps(_report(index, verdict), ensure_ascii=False)))
     for told in verdict.faults:
         complain(told)
     tell(_sentence(index, every, verdict))
     return DAMAGED if verdict.faults else 0
 
 
-def _report(root: Path, verdict: "Verdict") -> dict[str, object]:
+def _report(index: Place, verdict: "Verdict") -> dict[str, object]:
     return {
-        "index": str(root),
+        "index": str(index.absolute()),
         "generations": verdict.generations,
         "sound": verdict.sound,
         "files": verdict.files,
@@ -54,7 +56,7 @@ def _report(root: Path, verdict: "Verdict") -> dict[str, object]:
     }
 
 
-def _sentence(index: Path, every: bool, verdict: "Verdict") -> str:
+def _sentence(index: Place, every: bool, verdict: "Verdict") -> str:
     if not verdict.faults:
         of_what = f"generation {verdict.generations[0]}" if not every else "all generations"
         return f"{index}: {of_what} sound, {verdict.files:,} files, {verdict.bytes:,} bytes"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from coordinator.export.attribution import attributions
 from coordinator.export.files import write_pieces
-from geo.geojson import Feature, collection_text
+from geo.geojson import Feature, collection_text, sequence_text
 from index.opened import OpenedIndex
 
 
@@ -35,6 +35,14 @@ def encoded(
     return (piece.encode() for piece in collection_text(features, about))
 
 
+def sequence(features: Iterable[Feature]) -> Iterator[bytes]:
+    """The bytes of a GeoJSON text sequence (RFC 8142), record by record; errors as `write_geojson`.
+
+    Each record stands for itself: what was written before an end that came early can be read.
+    """
+    return (record.encode() for record in sequence_text(features))
+
+
 def provenance(index: OpenedIndex) -> dict[str, object]:
     """Where results come from, and by which operation their coordinates (`geo.operations`).
 
@@ -43,7 +51,7 @@ def provenance(index: OpenedIndex) -> dict[str, object]:
     """
     about: dict[str, object] = {
         "version": version("flaneur"),
-        "index": str(index.root.absolute()),
+        "index": index.place,
         "generation": index.generation.number,
         "crs": index.generation.crs,
         "attribution": attributions(index.generation),

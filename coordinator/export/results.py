@@ -8,15 +8,17 @@ from typing import IO
 
 from contracts.errors import WrongInput
 from coordinator.export.answers import KeptAnswers
-from coordinator.export.geojson import write_geojson
+from coordinator.export.files import write_pieces
+from coordinator.export.geojson import sequence, write_geojson
 from coordinator.querying import Located
 from geo.geojson import Feature
 from index.opened import OpenedIndex
 
 GEOJSON = (".geojson", ".json")
+SEQUENCE = (".geojsons",)
 GEOPACKAGE = (".gpkg",)
 VECTORS = (".fgb", ".parquet", ".kml")
-FORMATS = (*GEOJSON, *GEOPACKAGE, *VECTORS)
+FORMATS = (*GEOJSON, *SEQUENCE, *GEOPACKAGE, *VECTORS)
 
 
 def refuse_unknown(outs: Sequence[Path]) -> None:
@@ -52,7 +54,7 @@ def refuse_unwritable(outs: Iterable[Path]) -> None:
 def write_results(
     outs: Sequence[Path],
     answers: Iterable[Located],
-    index: OpenedIndex,
+    index: OpenedIndex | None,
     about: Mapping[str, object],
     tell: Callable[[str], None],
 ) -> None:
@@ -66,6 +68,7 @@ def write_results(
     Parameters
     ----------
     outs : files, their endings of `FORMATS`. about : of the GeoJSON (`provenance`).
+    index : that answered; None: it is gone, which leaves GeoJSON and its sequences.
     tell : called with a sentence that says what is whole, or where answers were kept.
 
     Raises
@@ -123,10 +126,20 @@ def _keep_partial(out: Path, kept: KeptAnswers, about: Mapping[str, object]) -> 
 
 
 def _write(
-    out: Path, answers: Iterable[Located], index: OpenedIndex, about: Mapping[str, object]
+    out: Path,
+    answers: Iterable[Located],
+    index: OpenedIndex | None,
+    about: Mapping[str, object],
 ) -> None:
     if _is_geojson(out):
         write_geojson(out, features_of(answers), about)
+    elif out.suffix.lower() in SEQUENCE:
+        write_pieces(out, sequence(features_of(answers)))
+    elif index is None:
+        raise WrongInput(
+            f"{out} tells more of the matched images than the answers do, and their generation of "
+            f"the index is gone. End it with one of {', '.join((*GEOJSON, *SEQUENCE))}."
+        )
     elif out.suffix.lower() in GEOPACKAGE:
         from coordinator.export.geopackage import write_geopackage
 

@@ -31,6 +31,8 @@ WRITE_S_A_BYTE = 2.4e-9
 READ_S_A_BYTE = 0.7e-9
 SAMPLE_S_AN_IMAGE = 100e-6
 """To hash an image's descriptors of a channel and offer them to the sample."""
+SAMPLE_S_A_SHARD = 0.003
+"""To read what a shard has put aside for the sample of a channel."""
 CHANNEL_FILE_S = 0.005
 """To read a channel's features of a shard and to write its partial index, whatever their size."""
 

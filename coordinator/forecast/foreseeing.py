@@ -13,6 +13,7 @@ from coordinator.forecast.stages import Stage, Tasks, equal_tasks, wall_s
 from coordinator.forecast.storage import Storage, foresee_storage
 from coordinator.forecast.vocabulary import Channel, foresee_channels
 from retrieval.merging import POSTINGS_AT_ONCE, word_ranges
+from retrieval.sampling import share_put_aside
 
 _SHARD_COPIES = 2
 """An extract worker holds its shard's features and lays them end to end."""
@@ -37,6 +38,7 @@ class Forecast:
     """
 
     n_images: int
+    shard_size: int
     n_shards: int
     n_sampled: int
     skipped: tuple[Skipped, ...]
@@ -78,6 +80,7 @@ def foresee(
     n_skipped = len(sample.skipped)
     return Forecast(
         n_images=n_images,
+        shard_size=shard_size,
         n_shards=n_shards,
         n_sampled=sample.n_images,
         skipped=sample.skipped,
@@ -188,8 +191,12 @@ class _Work:
 
     def _training_s(self, channel: Channel) -> Range:
         points = self._trained_points(channel)
-        read = channel.points.likely * channel.dimensions * costs.READ_S_A_BYTE
-        read += self.n_images * costs.SAMPLE_S_AN_IMAGE
+        found = channel.points.likely
+        share = share_put_aside(found, self.config.codebooks.max_train_points)
+        read = (share or 1.0) * found * channel.dimensions * costs.READ_S_A_BYTE
+        read += self.n_shards * costs.SAMPLE_S_A_SHARD
+        if not share:
+            read += self.n_images * costs.SAMPLE_S_AN_IMAGE
         return self._modelled(read + costs.train_s(points, channel.n_words, channel.dimensions))
 
     def _training_bytes(self, channel: Channel) -> float:

@@ -29,6 +29,7 @@ def as_dict(forecast: Forecast) -> dict[str, object]:
         "images": forecast.n_images,
         "sampled": forecast.n_sampled,
         "shards": forecast.n_shards,
+        "shard_size": forecast.shard_size,
         "skipped": [asdict(each) for each in forecast.skipped],
         "unreadable": None if forecast.unreadable is None else asdict(forecast.unreadable),
         "waiting": forecast.waiting,
@@ -76,6 +77,7 @@ def opening(forecast: Forecast) -> list[str]:
     each = ranged(forecast.seconds_an_image, seconds)
     lines = [
         f"{forecast.n_images:,} images; {forecast.n_sampled} sampled, {each} an image on one core",
+        f"Shards: {forecast.n_shards:,} of {forecast.shard_size} images",
         f"Frames an image: {frames}",
         f"Words: {sizes}",
     ]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from contracts.config import Where
 from contracts.errors import BadTruth
+from contracts.places import Place
 from coordinator.truth.holidays import is_holidays, read_holidays
 from coordinator.truth.names import Names
 from coordinator.truth.oxford import read_oxford
@@ -29,7 +30,7 @@ class JudgedQuery:
     """
 
     query: str
-    path: Path
+    path: Place
     relevant: tuple[int, ...]
     junk: tuple[int, ...] = ()
     box: Box | None = None

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from contracts.errors import BadSurvey, BadTruth
+from contracts.places import Place, place_of
 from coordinator.truth.names import Names
 from survey.files import list_images
 
@@ -30,7 +31,7 @@ class Photos:
         if paths:
             self._places.append((indexed, paths))
 
-    def path(self, query: str, name: str) -> Path:
+    def path(self, query: str, name: str) -> Place:
         """Where the photo of this name is.
 
         Raises
@@ -45,7 +46,7 @@ class Photos:
                     f"({names.uris_of(found)}). Write more of its path."
                 )
             if found:
-                return Path(paths[found[0]])
+                return place_of(paths[found[0]])
         where = "the index" if self._root is None else f"{self._root} nor the index"
         raise BadTruth(
             f"The photo of query {query}, {name}, is {'not' if self._root is None else 'neither'} "

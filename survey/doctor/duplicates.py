@@ -4,13 +4,14 @@ import hashlib
 import os
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 
+from contracts.places import store_errors
 from contracts.records import PosedImage
 from survey.doctor.findings import Finding, share, uris_of
 from survey.doctor.track import Track
+from survey.stored import open_place, state_of
 
 _GLANCE_BYTES = 4_096
 _READ_AT_MOST = 2_000_000_000
@@ -89,14 +90,14 @@ def _split(groups: Iterable[list[str]], key: Callable[[str], Hashable | None]) -
 
 def _size(path: str) -> int | None:
     try:
-        return os.stat(path).st_size or None  # noqa: PTH116  (a Path for each of 100,000 is slow)
+        return state_of(path).size or None
     except OSError:
         return None
 
 
 def _glance(path: str) -> bytes | None:
     try:
-        with Path(path).open("rb") as file:
+        with store_errors(path), open_place(path) as file:
             size = file.seek(0, os.SEEK_END)
             file.seek(max(0, size // 2 - _GLANCE_BYTES // 2))
             return file.read(_GLANCE_BYTES)
@@ -107,7 +108,7 @@ def _glance(path: str) -> bytes | None:
 def _digest(path: str) -> bytes | None:
     digest = hashlib.sha256()
     try:
-        with Path(path).open("rb") as file:
+        with store_errors(path), open_place(path) as file:
             while block := file.read(_CHUNK):
                 digest.update(block)
     except OSError:

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
-from pathlib import Path
 
+from contracts.places import Place, place_of
 from survey.doctor.angles import check_angles
 from survey.doctor.conversion import check_conversion
 from survey.doctor.duplicates import check_files_twice, check_poses_twice
@@ -40,7 +40,7 @@ CHECKS_OF_TRACK = (
 class Examination:
     """All that was found, worst first. track : None where no position can be true."""
 
-    path: Path
+    path: Place
     format: str
     crs: str | None
     figures: Figures
@@ -48,7 +48,7 @@ class Examination:
     track: Track | None
 
 
-def examine(path: Path, options: ReadOptions, now: datetime) -> Examination:
+def examine(path: Place, options: ReadOptions, now: datetime) -> Examination:
     """Check a survey; nothing is written, and images are only sampled.
 
     The order of the images does not matter. now : with a zone; later images cannot be.
@@ -58,7 +58,8 @@ def examine(path: Path, options: ReadOptions, now: datetime) -> Examination:
     BadSurvey : nothing is there, or no reader knows it. BadConfig : `options.format` names no
         reader. UnknownCrs : `options.crs` is no coordinate system.
     """
-    opened = open_survey(Path(path), options)
+    path = place_of(str(path))
+    opened = open_survey(path, options)
     inside, findings = check_system(opened)
     track = None
     if inside and opened.crs:
@@ -71,7 +72,7 @@ def examine(path: Path, options: ReadOptions, now: datetime) -> Examination:
         findings += check_files_twice(opened.images)
     findings += _of_track(track, opened, options)
     return Examination(
-        path=Path(path),
+        path=path,
         format=opened.format,
         crs=opened.crs,
         figures=figures_of(opened.images, len(opened.skipped), track),

@@ -1,9 +1,9 @@
 """Read a survey as far as it can be read: what `read_survey` would refuse is examined as well."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from contracts.errors import UnknownCrs, WrongInput
+from contracts.places import Place
 from contracts.records import PosedImage, Skipped
 from geo.crs import ToWgs84
 from survey.doctor.findings import Finding
@@ -25,7 +25,7 @@ class Opened:
     findings : why it would be refused, and what the reader itself has to say.
     """
 
-    path: Path
+    path: Place
     format: str
     images: tuple[PosedImage, ...]
     skipped: tuple[Skipped, ...]
@@ -34,7 +34,7 @@ class Opened:
     findings: tuple[Finding, ...]
 
 
-def open_survey(path: Path, options: ReadOptions) -> Opened:
+def open_survey(path: Place, options: ReadOptions) -> Opened:
     """Read the survey; a refusal by its reader is a finding.
 
     Raises
@@ -62,7 +62,7 @@ def open_survey(path: Path, options: ReadOptions) -> Opened:
 
 
 def _opened(
-    path: Path, reader: Reader, reading: Reading, findings: tuple[Finding, ...], bare: bool
+    path: Place, reader: Reader, reading: Reading, findings: tuple[Finding, ...], bare: bool
 ) -> Opened:
     return Opened(
         path=path,
@@ -75,7 +75,7 @@ def _opened(
     )
 
 
-def _bare(reader: Reader, path: Path, options: ReadOptions) -> Reading:
+def _bare(reader: Reader, path: Place, options: ReadOptions) -> Reading:
     """The survey with its coordinates as mere numbers, or empty where that fails as well."""
     try:
         return read_wanted(reader, path, replace(options, crs=_BARE_NUMBERS))

@@ -5,14 +5,15 @@ opened. Without an index, or with a damaged one, the file is walked from its beg
 as it goes. Either way one chunk is held at a time.
 """
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, Footer, Schema
 
+from contracts.places import Place
 from survey.mcap.framing import (
     HEADER_BYTES,
     MAGIC,
@@ -28,10 +29,13 @@ from survey.mcap.framing import (
     records_in,
     stream,
 )
+from survey.stored import open_place
 
 _FOOTER_BYTES = HEADER_BYTES + 20
 _END = frozenset({int(Opcode.DATA_END), int(Opcode.FOOTER)})
 _MAX_SUMMARY_BYTES = 1 << 28
+_READ_AHEAD_BYTES = 1 << 23
+"""Of a file in a store: some chunks, as it is mostly read from its beginning to its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,15 +97,15 @@ def message_kind(encoding: str, schema_name: str) -> str:
     return f"{encoding}:{schema_name}"
 
 
-def read_messages(path: Path, wanted: Callable[[Topic], bool]) -> Iterator[Stored | Damage]:
+def read_messages(path: Place, wanted: Callable[[Topic], bool]) -> Iterator[Stored | Damage]:
     """Every message of the topics asked for, and what could not be read.
 
     Raises
     ------
     OSError : the file cannot be opened or read.
     """
-    file_bytes = path.stat().st_size
-    with path.open("rb") as file:
+    with open_place(path, _READ_AHEAD_BYTES) as file:
+        file_bytes = file.seek(0, os.SEEK_END)
         summary = _summary(file, file_bytes)
         if summary is not None and summary[1]:
             yield from _indexed(file, file_bytes, summary[0], summary[1], wanted)

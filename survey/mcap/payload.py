@@ -1,7 +1,7 @@
 """The picture in one message of an MCAP file, found by its place in the file."""
 
 import functools
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from mcap.opcode import Opcode
 
@@ -20,6 +20,7 @@ from survey.mcap.framing import (
     record_in,
 )
 from survey.mcap.raw_images import as_netpbm
+from survey.stored import State, state_of
 
 
 def image_bytes(path: str | Path, message: Message) -> bytes:
@@ -33,20 +34,20 @@ def image_bytes(path: str | Path, message: Message) -> bytes:
     UnusableImage : the file is gone or another one, damaged there, or the message holds no image
         of a known kind.
     """
-    path = Path(path)
     try:
-        image = decode_image(message.kind, _message_data(path, message))
+        image = decode_image(message.kind, _message_data(str(path), message))
         return as_netpbm(image) if image.raw else bytes(image.data)
     except (Damaged, ValueError) as error:
-        raise UnusableImage(f"message at byte {message.record} of {path.name}: {error}") from error
+        raise UnusableImage(
+            f"message at byte {message.record} of {PurePath(path).name}: {error}"
+        ) from error
     except OSError as error:
         raise UnusableImage(f"cannot be opened: {error.strerror}") from error
 
 
-def _message_data(path: Path, message: Message) -> memoryview:
+def _message_data(path: str, message: Message) -> memoryview:
     """Raises Damaged where no such message is there."""
-    stat = path.stat()
-    record = _top_record(path, stat.st_mtime_ns, stat.st_size, message.record)
+    record = _top_record(path, state_of(path), message.record)
     if is_chunk(record):
         record = record_in(record.body, message.offset)
     if record.opcode != Opcode.MESSAGE:
@@ -61,13 +62,12 @@ def _message_data(path: Path, message: Message) -> memoryview:
 
 
 @functools.lru_cache(maxsize=1)
-def _top_record(path: Path, mtime_ns: int, file_bytes: int, at: int) -> Record:
-    """The record at `at`; of a chunk, its opened content."""
-    del mtime_ns  # part of the cache's key
+def _top_record(path: str, state: State, at: int) -> Record:
+    """The record at `at`; of a chunk, its opened content. state : a changed file is read again."""
     with regular_file(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise Damaged("the file is not an MCAP file")
-        record = read_record(file, at, file_bytes)
+        record = read_record(file, at, state.size)
     if is_chunk(record):
         return Record(record.opcode, at, opened_chunk(record.body))
     return record

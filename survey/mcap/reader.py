@@ -5,9 +5,9 @@ world of ROS REP 103 means it; the `north` option overrides it.
 """
 
 from collections.abc import Callable
-from pathlib import Path
 
 from contracts.errors import BadSurvey
+from contracts.places import Place
 from contracts.records import PosedImage, Skipped
 from survey.mcap.drives import drives
 from survey.mcap.listing import is_mcap, mcap_files
@@ -21,16 +21,17 @@ from survey.mcap.posing import (
 )
 from survey.mcap.recording import Recording, read_recording
 from survey.options import Reader, Reading, ReadOptions
+from survey.stored import is_file
 
 
-def recognises(path: Path) -> bool:
+def recognises(path: Place) -> bool:
     """A file that begins as MCAP does or is named so, or a folder with one that does both."""
-    if path.is_file():
+    if is_file(path):
         return is_mcap(path) or path.suffix.lower() == ".mcap"
     return bool(mcap_files(path)[0])
 
 
-def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
+def read(path: Place, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
     """Every image message asked for; no image is decoded.
 
     Raises
@@ -43,7 +44,7 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
         raise BadSurvey(_why_none(path))
     recordings: dict[str, Recording] = {}
     for name, file in files.items():
-        prefix = "" if path.is_file() else f"{name}/"
+        prefix = "" if is_file(path) else f"{name}/"
         try:
             recordings[name] = read_recording(
                 file, name, prefix, wanted, with_poses=not options.no_pose
@@ -65,7 +66,7 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     return _posed(path, found, options, skipped, notes)
 
 
-def _why_none(path: Path) -> str:
+def _why_none(path: Place) -> str:
     if path.is_dir():
         return f"survey {path}: no MCAP file in the folder (names end in .mcap)"
     if not path.stat().st_size:
@@ -77,7 +78,7 @@ def _why_none(path: Path) -> str:
 
 
 def _posed(
-    path: Path,
+    path: Place,
     found: list[Recording],
     options: ReadOptions,
     skipped: list[Skipped],

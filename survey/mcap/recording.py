@@ -4,9 +4,9 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TypeVar
 
+from contracts.places import Place
 from contracts.records import Skipped
 from survey.fragments import Message
 from survey.mcap import raw_images
@@ -73,7 +73,7 @@ class Recording:
 
 
 def read_recording(
-    path: Path, name: str, prefix: str, wanted: Callable[[str], bool], *, with_poses: bool
+    path: Place, name: str, prefix: str, wanted: Callable[[str], bool], *, with_poses: bool
 ) -> Recording:
     """Everything in a file that matters, read once.
 

@@ -4,13 +4,15 @@ North: the `north` option, else the profile's, else grid for a projected system 
 degrees.
 """
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Set
+from pathlib import Path, PurePath
 
 from contracts.errors import BadSurvey, WrongInput
+from contracts.places import Place
 from contracts.records import PosedImage, Skipped
-from survey.files import list_images
+from survey.files import list_images, visible_objects
 from survey.options import Reader, Reading, ReadOptions
+from survey.stored import is_file
 from survey.tables import mapping, records, text, vector
 from survey.tables.images import ImageFinder, filled
 from survey.tables.profile import Profile
@@ -20,17 +22,19 @@ from survey.tables.table import Table
 
 _TEXT_SUFFIXES = frozenset({".csv", ".tsv", ".txt"})
 _MAPILLARY = "mapillary_image_description.json"
+_TABLE_SUFFIXES = frozenset({".csv", ".tsv", ".json"}) | vector.SUFFIXES
+"""Of what may be a pose table without being named; of JSON only Mapillary's."""
 
 
-def recognises(path: Path) -> bool:
+def recognises(path: Place) -> bool:
     """A table, or a folder with at least one that names a file and a position."""
-    if path.is_file():
+    if is_file(path):
         known = path.suffix.lower() in _TEXT_SUFFIXES or records.is_records(path)
         return known or vector.vector_format(path) is not None
     return bool(_tables_in(path))
 
 
-def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
+def read(path: Place, options: ReadOptions, wanted: Callable[[str], bool]) -> Reading:
     """Every image that has a row; no image is opened.
 
     Raises
@@ -41,7 +45,7 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     """
     del wanted
     given = None if options.mapping is None else mapping.read_mapping(options.mapping)
-    file = path if path.is_file() else _only_table(path, given)
+    file = path if is_file(path) else _only_table(path, given)
     table, profile = _read_table(file, given)
     rows = read_rows(table, profile, options)
     listing = list_images(file.parent)
@@ -55,15 +59,27 @@ def read(path: Path, options: ReadOptions, wanted: Callable[[str], bool]) -> Rea
     return Reading(tuple(images), tuple(skipped), rows.positions.crs, rows.notes)
 
 
-def _tables_in(folder: Path) -> list[Path]:
+def _tables_in(folder: Place) -> list[Place]:
     try:
-        entries = sorted(folder.iterdir())
+        entries = _files_in(folder, _TABLE_SUFFIXES)
     except OSError as error:
         raise BadSurvey(f"survey {folder} cannot be listed: {error.strerror}") from error
-    return [entry for entry in entries if entry.is_file() and _looks_like_poses(entry)]
+    return [entry for entry in entries if _looks_like_poses(entry)]
 
 
-def _looks_like_poses(file: Path) -> bool:
+def _files_in(folder: Place, suffixes: Set[str]) -> list[Place]:
+    """Files right in a folder, in order of names, of those whose names end so."""
+
+    def fits(path: PurePath) -> bool:
+        return path.suffix.lower() in suffixes
+
+    if isinstance(folder, Path):
+        return [each for each in sorted(folder.iterdir()) if fits(each) and each.is_file()]
+    names = visible_objects(folder)
+    return [folder / name for name in names if "/" not in name and fits(PurePath(name))]
+
+
+def _looks_like_poses(file: Place) -> bool:
     suffix = file.suffix.lower()
     if suffix in {".csv", ".tsv"}:
         return text.looks_like_poses(file)
@@ -72,10 +88,10 @@ def _looks_like_poses(file: Path) -> bool:
     return file.name == _MAPILLARY
 
 
-def _only_table(folder: Path, given: mapping.TableMapping | None) -> Path:
+def _only_table(folder: Place, given: mapping.TableMapping | None) -> Place:
     if given is not None and given.table is not None:
         file = folder / given.table
-        if Path(given.table).name != given.table or not file.is_file():
+        if PurePath(given.table).name != given.table or not file.is_file():
             raise BadSurvey(f"survey {folder}: the mapping's table {given.table!r} is not in it")
         return file
     tables = _tables_in(folder) if given is None else _candidates(folder)
@@ -88,17 +104,12 @@ def _only_table(folder: Path, given: mapping.TableMapping | None) -> Path:
     return tables[0]
 
 
-def _candidates(folder: Path) -> list[Path]:
+def _candidates(folder: Place) -> list[Place]:
     """Files that a mapping could be about."""
-    suffixes = _TEXT_SUFFIXES | vector.SUFFIXES
-    return [
-        entry
-        for entry in sorted(folder.iterdir())
-        if entry.suffix.lower() in suffixes and entry.is_file()
-    ]
+    return _files_in(folder, _TEXT_SUFFIXES | vector.SUFFIXES)
 
 
-def untaken_tables(folder: Path) -> str:
+def untaken_tables(folder: Place) -> str:
     """What is to be told of the files in a folder that could be pose tables; "" without any.
 
     A `.txt` that is no table is a text like others.
@@ -116,7 +127,7 @@ def untaken_tables(folder: Path) -> str:
     return told
 
 
-def _read_table(file: Path, given: mapping.TableMapping | None) -> tuple[Table, Profile]:
+def _read_table(file: Place, given: mapping.TableMapping | None) -> tuple[Table, Profile]:
     own = None if given is None else given.profile
     if vector.vector_format(file) is not None:
         table = vector.read_vector(file, own)

@@ -1,19 +1,20 @@
 """A table as a JSON list of objects, such as `mapillary_image_description.json`."""
 
 import json
-from pathlib import Path
 
 from contracts.errors import BadSurvey
+from contracts.places import Place
+from survey.stored import open_place
 from survey.tables.profile import plain_name
 from survey.tables.table import Faults, Table
 
 _MAX_BYTES = 1 << 30
 
 
-def is_records(path: Path) -> bool:
+def is_records(path: Place) -> bool:
     """Whether a file is JSON that begins with a list."""
     try:
-        with path.open("rb") as file:
+        with open_place(path) as file:
             start = file.read(64)
     except OSError:
         return False
@@ -21,7 +22,7 @@ def is_records(path: Path) -> bool:
     return path.suffix.lower() == ".json" and text.startswith(b"[")
 
 
-def read_records(path: Path) -> Table:
+def read_records(path: Place) -> Table:
     """One row an object; an object within one gives columns `outer.inner`.
 
     An entry that mapillary_tools gave up on (`error`), or that is no image, is a fault.
@@ -46,7 +47,7 @@ def read_records(path: Path) -> Table:
     return Table(path, tuple(names), columns, numbers, row_word="entry", faults=faults)
 
 
-def _entries(path: Path) -> list[dict[str, object]]:
+def _entries(path: Place) -> list[dict[str, object]]:
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise BadSurvey(f"pose table {path} is larger than 1 GiB; write it as CSV")

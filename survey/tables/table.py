@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from contracts.places import Place
 
 Column = Sequence[str] | NDArray[np.float64]
 """The cells of one column: text, or numbers where the format has them; NaN: not known."""
@@ -24,7 +25,7 @@ class Table:
     None. crs : of `xyz`. faults : rows whose geometry or record cannot be used.
     """
 
-    path: Path
+    path: Place
     names: tuple[str, ...]
     columns: tuple[Column, ...]
     numbers: Sequence[int]

@@ -5,9 +5,10 @@ import csv
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from contracts.errors import BadSurvey
+from contracts.places import Place
+from survey.stored import open_place
 from survey.tables.profile import Profile
 from survey.tables.profiles import recognised, recognised_cells
 from survey.tables.table import Faults, Table
@@ -44,7 +45,7 @@ class Layout:
     decimal_comma: bool | None = None
 
 
-def read_text(path: Path, layout: Layout, profile: Profile | None) -> Table:
+def read_text(path: Place, layout: Layout, profile: Profile | None) -> Table:
     """All rows of a separated-values file.
 
     UTF-8 with or without a byte order mark, UTF-16 or UTF-32 with one, else Latin-1, unless the
@@ -84,10 +85,10 @@ def _first_line(lines: "_Lines", skip_lines: int) -> str:
     raise BadSurvey(f"pose table {lines.path} is empty; expected a header and rows")
 
 
-def looks_like_poses(path: Path) -> bool:
+def looks_like_poses(path: Place) -> bool:
     """Whether a file begins like a pose table that a profile knows; reads its beginning only."""
     try:
-        with path.open("rb") as file:
+        with open_place(path) as file:
             start = file.read(_HEADER_BYTES)
     except OSError:
         return False
@@ -117,7 +118,7 @@ def _knower(profile: Profile | None, layout: Layout) -> Callable[[Sequence[str]]
 class _Lines:
     """The lines of a file, counted from 1, none too long, none with a NUL."""
 
-    path: Path
+    path: Place
     encoding: str
     number: int = 0
     complete: bool = True
@@ -221,7 +222,7 @@ def _stated_separator(line: str) -> str | None:
 
 
 def _refuse_other_separator(
-    path: Path, body: list[tuple[int, list[str]]], separator: str, width: int
+    path: Place, body: list[tuple[int, list[str]]], separator: str, width: int
 ) -> None:
     """Refuse rows that all have as many cells as the header, but by another separator."""
     for other in _SEPARATORS:
@@ -242,11 +243,11 @@ def _is_by_other(row: list[str], separator: str, other: str, width: int) -> bool
     return other != separator and apart and len(_cells(separator.join(row), other)) == width
 
 
-def _encoding(path: Path) -> str:
+def _encoding(path: Place) -> str:
     """UTF-8 if all of the file is, what its byte order mark says, else Latin-1."""
     decoder = codecs.getincrementaldecoder("utf-8")()
     try:
-        with path.open("rb") as file:
+        with open_place(path) as file:
             start = file.read(_HEADER_BYTES)
             for magic, what in _BINARY.items():
                 if start.startswith(magic):

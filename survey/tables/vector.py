@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contracts.errors import BadSurvey
+from contracts.places import Place
 from survey.poses import crs_name
+from survey.stored import local_copy, open_place
 from survey.tables.profile import Profile
 from survey.tables.profiles import NOT_RESULTS, of_results, recognised
 from survey.tables.table import Column, Faults, Table
@@ -34,13 +36,13 @@ _JSON_SUFFIXES = frozenset({".geojson", ".geojsonl", ".ndjson", ".json"})
 _START_BYTES = 4096
 
 
-def vector_format(path: Path) -> str | None:
+def vector_format(path: Place) -> str | None:
     """The format of a file of points by its first bytes, or None.
 
     GDAL is handed nothing else: it has formats that name further files to open.
     """
     try:
-        with path.open("rb") as file:
+        with open_place(path) as file:
             start = file.read(_START_BYTES)
     except OSError:
         return None
@@ -53,7 +55,7 @@ def vector_format(path: Path) -> str | None:
     return None
 
 
-def holds_poses(path: Path) -> bool:
+def holds_poses(path: Place) -> bool:
     """Whether a file of points has a layer with a file column; reads no features."""
     try:
         layers = _layers(path)
@@ -62,7 +64,7 @@ def holds_poses(path: Path) -> bool:
     return any(recognised(layer.fields, layer.has_points) for layer in layers)
 
 
-def read_vector(path: Path, profile: Profile | None) -> Table:
+def read_vector(path: Place, profile: Profile | None) -> Table:
     """All features of the layer with a file column; geometries give the positions.
 
     profile : of a mapping; None: whichever profile knows the layer's columns.
@@ -92,7 +94,7 @@ class _Layer:
     has_points: bool
 
 
-def _pose_layer(path: Path, profile: Profile | None) -> _Layer:
+def _pose_layer(path: Place, profile: Profile | None) -> _Layer:
     layers = _layers(path)
     fits = recognised if profile is None else profile.fits
     good = [layer for layer in layers if fits(layer.fields, layer.has_points)]
@@ -110,19 +112,19 @@ def _pose_layer(path: Path, profile: Profile | None) -> _Layer:
     )
 
 
-def _layers(path: Path) -> list[_Layer]:
-    with _reading(path):
+def _layers(path: Place) -> list[_Layer]:
+    with _reading(path) as here:
         if vector_format(path) == "Parquet":
             import pyarrow.parquet
 
-            schema = pyarrow.parquet.read_schema(path)
+            schema = pyarrow.parquet.read_schema(here)
             has_points = b"geo" in (schema.metadata or {})
             return [_Layer(None, tuple(schema.names), has_points)]
         import pyogrio
 
         layers = []
-        for name, geometry_type in pyogrio.list_layers(path):
-            fields = pyogrio.read_info(path, layer=name)["fields"]
+        for name, geometry_type in pyogrio.list_layers(here):
+            fields = pyogrio.read_info(here, layer=name)["fields"]
             layers.append(
                 _Layer(str(name), tuple(map(str, fields)), _may_hold_points(geometry_type))
             )
@@ -134,17 +136,17 @@ def _may_hold_points(geometry_type: str | None) -> bool:
     return geometry_type is not None and ("Point" in geometry_type or geometry_type == "Unknown")
 
 
-def _frame(path: Path, layer: _Layer) -> "pandas.DataFrame":
-    with _reading(path):
+def _frame(path: Place, layer: _Layer) -> "pandas.DataFrame":
+    with _reading(path) as here:
         if layer.name is not None:
             import pyogrio
 
-            return pyogrio.read_dataframe(path, layer=layer.name, datetime_as_string=True)
+            return pyogrio.read_dataframe(here, layer=layer.name, datetime_as_string=True)
         if layer.has_points:
-            return _geopandas().read_parquet(path)
+            return _geopandas().read_parquet(here)
         import pyarrow.parquet
 
-        return pyarrow.parquet.read_table(path).to_pandas()
+        return pyarrow.parquet.read_table(here).to_pandas()
 
 
 def _geopandas() -> ModuleType:
@@ -153,15 +155,18 @@ def _geopandas() -> ModuleType:
 
 
 @contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    """What GDAL, Arrow and GEOS raise on a damaged file, as one error."""
+def _reading(path: Place) -> Iterator[Path]:
+    """Where the file can be opened by its name.
+
+    What GDAL, Arrow and GEOS raise on a damaged file becomes one error.
+    """
     from pyproj.exceptions import ProjError
     from shapely.errors import ShapelyError
 
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), local_copy(path) as here:
             warnings.simplefilter("ignore")  # whatever matters is raised as well
-            yield
+            yield here
     except (
         *(ArithmeticError, AttributeError, KeyError, OSError, RuntimeError, TypeError),
         *(ValueError, ProjError, ShapelyError),
@@ -172,7 +177,7 @@ def _reading(path: Path) -> Iterator[None]:
         raise BadSurvey(f"pose table {path} cannot be read: {first_line}") from error
 
 
-def _is_utf8(path: Path) -> bool:
+def _is_utf8(path: Place) -> bool:
     try:
         path.read_bytes().decode()
     except UnicodeDecodeError:

@@ -3,7 +3,7 @@
 import json
 import math
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,11 +11,13 @@ import pytest
 
 from contracts.config import SearchConfig
 from contracts.errors import BadConfig, TaskFailed, WrongInput
-from coordinator import querying
+from coordinator.batches.photos import Photo, photo_file
 from coordinator.events import Order
 from coordinator.export.geojson import write_geojson
 from coordinator.export.results import refuse_unknown, refuse_unwritable, write_results
-from coordinator.follow import Follower, Outcome
+from coordinator.flow import Outcome
+from coordinator.follow import Follower
+from coordinator.holding import IN_MEMORY_BYTES, HeldAnswers
 from coordinator.querying import Located, locate_photos
 from geo.geojson import Feature, PlacedMatch, error_feature, match_feature
 from index.opened import OpenedIndex
@@ -85,6 +87,20 @@ def test_a_large_batch_is_whole(tmp_path: Path) -> None:
     write_geojson(out, ({**feature, "id": f"{number:x}"} for number in range(50_000)))
     with out.open(encoding="utf-8") as lines:
         assert sum('"type":"Feature",' in line for line in lines) == 50_000
+
+
+def test_a_sequence_is_of_records_that_each_stand_for_themselves(tmp_path: Path) -> None:
+    """RFC 8142: a record separator, a text, a line feed; cut anywhere, the rest is whole."""
+    out = tmp_path / "results.geojsons"
+    write_results([out], answers(2), NO_INDEX, ABOUT, lambda _: None)
+    content = out.read_bytes()
+    records = content.split(b"\x1e")
+    assert records[0] == b""
+    assert all(record.endswith(b"\n") for record in records[1:])
+    features = [json.loads(record) for record in records[1:]]
+    assert features == [match(f"{n}.jpg", rank) for n in range(2) for rank in (1, 2)]
+    cut = content[: len(content) - 20].split(b"\x1e")[1:]
+    assert [record.endswith(b"\n") for record in cut] == [True, True, True, False]
 
 
 def test_a_dash_says_how_to_write_on_stdout(tmp_path: Path) -> None:
@@ -239,13 +255,13 @@ class Fails(LastFirst):
 class Opened:
     """What a message takes of an index."""
 
-    root = Path("/index")
+    place = "/index"
 
     class generation:  # noqa: N801 - an attribute of the index
         number = 3
 
 
-def located(follower: LastFirst, photos: list[str]) -> Iterator[Located]:
+def located(follower: LastFirst, photos: Sequence[str | Photo]) -> Iterator[Located]:
     return locate_photos(
         cast(OpenedIndex, Opened()),
         photos,
@@ -255,22 +271,41 @@ def located(follower: LastFirst, photos: list[str]) -> Iterator[Located]:
     )
 
 
-def test_answers_come_in_the_order_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(querying, "WINDOW", 4)
+def test_answers_come_in_the_order_asked() -> None:
     photos = [f"{number}.jpg" for number in range(11)]
-    follower = LastFirst()
-    assert [answer.query for answer in located(follower, photos)] == photos
-    assert follower.sent == [4, 4, 3]
+    assert [answer.query for answer in located(LastFirst(), photos)] == photos
 
 
-def test_no_more_than_a_window_is_sent_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(querying, "WINDOW", 4)
+def test_nothing_is_sent_before_it_is_asked_for() -> None:
     follower = LastFirst()
-    coming = located(follower, [f"{number}.jpg" for number in range(11)])
+    coming = located(follower, ["a.jpg", "b.jpg"])
     assert follower.sent == []
-    for _ in range(4):
-        next(coming)
-    assert follower.sent == [4]
+    assert next(coming).query == "a.jpg"
+    assert follower.sent == [2]
+
+
+def test_answers_that_wait_for_their_turn_are_not_in_memory() -> None:
+    """While the first photo keeps a worker busy, thousands of others are answered."""
+    features = tuple(match("a.jpg", rank) for rank in range(200))
+    with HeldAnswers() as held:
+        tracemalloc.start()
+        try:
+            for number in range(1, 600):
+                held.put(number, features, 0.25)
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        assert peak < 1.5 * IN_MEMORY_BYTES
+        assert held.take(599) == (features, 0.25)
+        assert 599 not in held
+        assert 1 in held
+
+
+def test_a_photo_that_cannot_be_had_is_an_error_in_its_place() -> None:
+    photos = [photo_file("a.jpg"), Photo("b", error="no such address"), photo_file("c.jpg")]
+    answers_given = list(located(LastFirst(), photos))
+    assert [each.query for each in answers_given] == ["a.jpg", "b", "c.jpg"]
+    assert answers_given[1].error == "no such address"
 
 
 def test_nothing_is_asked_of_no_photo() -> None:

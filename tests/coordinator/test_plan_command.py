@@ -37,13 +37,14 @@ def survey(small_survey: Path, tmp_path: Path) -> Path:
 def test_the_report_has_every_stage_and_the_workers_asked_for(small_survey: Path) -> None:
     before = sorted(small_survey.iterdir())
     report = report_of(small_survey, "--workers", "3", "--workers", "1", "--sample", "4")
-    assert (report["images"], report["sampled"], report["shards"]) == (10, 4, 1)
+    assert (report["images"], report["sampled"], report["shards"]) == (10, 4, 2)
+    assert report["shard_size"] == 8
     assert list(report["stages"]) == ["extract", "train", "assign", "merge", "join"]
     assert list(report["wall_s"]) == ["1", "3"]
     assert set(report["channels"]) == {"mser-sift", "mser-surf", "mser-sc"}
     assert {channel["words"] for channel in report["channels"].values()} == {50}
     assert 0.0 < report["core_s"]["low"] < report["core_s"]["likely"] < report["core_s"]["high"]
-    assert report["messages"] == 1 + 3 + 1 + 3 + 3
+    assert report["messages"] == 2 + 3 + 2 + 3 + 3
     assert sorted(small_survey.iterdir()) == before
 
 
@@ -52,6 +53,7 @@ def test_a_person_reads_times_memory_and_disk(small_survey: Path) -> None:
     assert answer.exit_code == 0, answer.stderr
     lines = answer.stdout.splitlines()
     assert lines[0].startswith("10 images; 3 sampled")
+    assert "Shards: 2 of 8 images" in lines
     for beginning in ("extract", "whole job", "memory", "finished index", "room needed"):
         assert any(line.startswith(beginning) for line in lines), beginning
     assert "8 workers" in answer.stdout

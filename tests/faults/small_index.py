@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, Where
+from contracts.records import Receipt
 from coordinator.adding import plan_addition, run_addition
 from coordinator.compacting import compact
 from coordinator.engine import Engine
 from coordinator.events import Order
+from coordinator.flow import Outcome
 from coordinator.indexing import run_job
 from coordinator.intake import Intake, read_surveys
 from coordinator.plan import make_plan
@@ -30,6 +32,7 @@ from index.files import sha256_of
 from index.jobs import JobFolder
 from index.opened import OpenedIndex
 from survey import ReadOptions
+from workers.app import make_app
 from workers.stages.assign import assign_shard
 from workers.stages.extract import extract_shard
 from workers.stages.join import join_channel
@@ -41,6 +44,7 @@ CONFIG = IndexConfig(
     codebooks=CodebookConfig(codebook_ratio=0.8, max_words=120),
 )
 CHANNEL = "hesaff-sift"
+NOBODY = make_app("redis+socket:///nobody/listens")
 Change = Callable[[Path], object]
 
 
@@ -60,31 +64,35 @@ class Here:
     """Does the tasks of a job in this process, up to the stage `before`."""
 
     before: str = ""
+    run_id: str = "here"
 
-    def results(self, orders: Iterable[Order]) -> Iterator[tuple[Order, dict[str, Any]]]:
+    def heeding(self, *_: object) -> "Here":
+        return self
+
+    def outcomes(self, orders: Iterable[Order | None]) -> Iterator[Outcome]:
         for order in orders:
-            if order.name == self.before:
-                raise _Reached
-            _do(order.name, order.message)
-            yield order, {}
+            if order is not None:
+                if order.name == self.before:
+                    raise _Reached
+                receipt = _do(order.name, order.message)
+                yield Outcome(order, {"counts": receipt.counts, "anew": True}, None)
 
     def engine(self) -> nullcontext[Engine]:
-        return nullcontext(Engine(None, self, 1))
+        return nullcontext(Engine(NOBODY, self, 1))
 
 
-def _do(name: str, message: dict[str, Any]) -> None:
+def _do(name: str, message: dict[str, Any]) -> Receipt:
     job, channel = JobFolder(Path(message["index"]), message["job"]), message.get("channel", "")
     if name == "extract":
-        extract_shard(job, message["shard"], str)
-    elif name == "train":
-        train_channel(job, channel)
-    elif name == "assign":
-        assign_shard(job, message["shard"], message["first_image_id"])
-    elif name == "merge":
+        return extract_shard(job, message["shard"], str)
+    if name == "train":
+        return train_channel(job, channel)
+    if name == "assign":
+        return assign_shard(job, message["shard"], message["first_image_id"])
+    if name == "merge":
         words = range(message["first_word"], message["stop_word"])
-        merge_words(job, channel, words, message["n_images"])
-    else:
-        join_channel(job, channel, message["first_words"], message["n_images"])
+        return merge_words(job, channel, words, message["n_images"])
+    return join_channel(job, channel, message["first_words"], message["n_images"])
 
 
 def read(survey: Path, name: str = "") -> Intake:

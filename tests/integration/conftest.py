@@ -48,7 +48,7 @@ def life(
 @pytest.fixture
 def same_engine(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     """All commands use the tests' engine; asking a broker who listens takes two seconds."""
-    monkeypatch.setattr("coordinator.engine.running_engine", lambda *_: nullcontext(engine))
+    monkeypatch.setattr("coordinator.engine.running_engine", lambda *_, **__: nullcontext(engine))
 
 
 @pytest.fixture(scope="session")

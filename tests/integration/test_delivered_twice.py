@@ -1,16 +1,16 @@
 """Real workers run every task twice, side by side, in other shards and ranges: the same bytes."""
 
-import time
+from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig
 from coordinator.cli.show import Bars
+from coordinator.courier import RedisCourier
 from coordinator.engine import Engine
-from coordinator.follow import Follower
+from coordinator.events import Order
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan
@@ -34,20 +34,15 @@ def test_tasks_delivered_twice_count_once_whatever_the_shards_and_ranges(
 ) -> None:
     once = index(small_survey, tmp_path / "once", engine, shard_size=10)
 
-    send = Follower._send
+    send = RedisCourier.send
     delivered: list[str] = []
 
-    def send_twice(self: Follower, flight) -> None:  # type: ignore[no-untyped-def]
-        again = replace(flight, task_id=f"{flight.task_id}.again")
-        send(self, flight)
-        send(self, again)
-        while not self._is_done(again):
-            time.sleep(0.01)
-        outcome = self._outcome(again)
-        assert outcome.error is None
-        delivered.append(outcome.order.name)
+    def send_twice(self: RedisCourier, orders: Mapping[str, Order]) -> None:
+        send(self, orders)
+        send(self, {f"{task_id}.again": order for task_id, order in orders.items()})
+        delivered.extend(order.name for order in orders.values())
 
-    monkeypatch.setattr(Follower, "_send", send_twice)
+    monkeypatch.setattr(RedisCourier, "send", send_twice)
     monkeypatch.setattr(merging, "POSTINGS_AT_ONCE", 300)
     assert index(small_survey, tmp_path / "twice", engine, shard_size=3) == once
     assert {name: delivered.count(name) for name in ("extract", "train", "assign", "join")} == {

@@ -11,8 +11,9 @@ from contracts.config import CodebookConfig, FeatureConfig, IndexConfig
 from index.codebooks import codebook_paths
 from index.files import write_arrays
 from index.jobs import IndexedImage, JobFolder, JobPlan
-from retrieval.codebooks import SampleReservoir
+from retrieval.sampling import SampleReservoir
 from workers.stages import train
+from workers.stages.sample import put_aside
 from workers.stages.train import train_channel
 
 CHANNEL, N_IMAGES, MOST = "hesaff-sc", 12, 150
@@ -43,13 +44,14 @@ def words_of(root: Path, order: list[int], shard_size: int) -> list[bytes]:
     job.write_plan(plan, ())
     for number, images in enumerate(shards):
         digests = [hashlib.sha256(bytes([image])).hexdigest() for image in images]
-        job.write_indexed(number, [IndexedImage(row, d, 9, 9) for row, d in enumerate(digests)])
+        indexed = [IndexedImage(row, digest, 9, 9) for row, digest in enumerate(digests)]
+        job.write_indexed(number, indexed)
         described = [DESCRIBED[image] for image in images]
         arrays: dict[str, NDArray[np.generic]] = {
             "hesaff/counts": np.array([len(each) for each in described], dtype=np.int32),
             CHANNEL: np.concatenate(described),
         }
-        write_arrays(job.features(number), arrays)
+        write_arrays(job.features(number), {**arrays, **put_aside(indexed, arrays, plan)})
     receipt = train_channel(job, CHANNEL)
     assert job.valid_receipt("train", CHANNEL) == receipt
     assert receipt.counts == {"words": 40, "points": sum(map(len, DESCRIBED))}
@@ -78,3 +80,29 @@ def test_no_more_points_are_held_than_the_configuration_allows(
     monkeypatch.setattr(train, "SampleReservoir", Watched)
     words_of(tmp_path, list(range(N_IMAGES)), 5)
     assert sizes == [MOST]
+
+
+@pytest.mark.parametrize("dense", [1, 30])
+def test_a_large_survey_is_trained_from_what_shards_put_aside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dense: int
+) -> None:
+    """dense : how many times as many descriptors the first image has as any other."""
+    sizes = [300 * dense, *[300] * (N_IMAGES - 1)]
+    described = [RNG.integers(0, 200, (size, 36), dtype=np.uint8) for size in sizes]
+    read_whole: list[int] = []
+    whole = train._all_of
+
+    def watched(
+        job: JobFolder, plan: JobPlan, shard: int, channel: str
+    ) -> tuple[NDArray[np.uint64], NDArray[np.uint8]]:
+        read_whole.append(shard)
+        return whole(job, plan, shard, channel)
+
+    monkeypatch.setattr(train, "_all_of", watched)
+    monkeypatch.setattr("test_train_stage.DESCRIBED", described)
+    order = list(range(N_IMAGES))
+    found = words_of(tmp_path / "aside", order, 1)
+    assert read_whole == ([0] if dense > 1 else [])
+    monkeypatch.setattr("retrieval.sampling._WORTH_PUTTING_ASIDE", 0.0)
+    assert words_of(tmp_path / "whole", order, 1) == found
+    assert sorted(read_whole[-N_IMAGES:]) == order

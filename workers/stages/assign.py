@@ -24,7 +24,7 @@ def assign_shard(job: JobFolder, shard: int, first_image_id: int) -> Receipt:
     outputs: dict[str, str] = {}
     counts = {"postings": 0, "first_image_id": first_image_id}
     for channel in plan.config.features.channels():
-        trained = job.read_receipt("train", channel)
+        trained = job.awaited_receipt("train", channel)
         if trained is None:
             raise TaskFailed(f"Shard {shard}: the codebook of {channel} has no receipt.")
         paths = codebook_paths(job.root, plan.codebooks, channel)
@@ -50,6 +50,7 @@ def assign_shard(job: JobFolder, shard: int, first_image_id: int) -> Receipt:
         outputs=outputs,
         counts=counts,
         instruction_set=instruction_set(),
+        made_from=job.words_digest(plan.config.features.channels()),
     )
     job.write_receipt(receipt)
     return receipt

@@ -2,6 +2,7 @@
 
 import platform
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from index.files import read_member, write_arrays
 from index.jobs import IndexedImage, JobFolder
 from retrieval.features import Features, extract
 from survey import DecodedImage, decode_image, decode_mask
+from workers.stages.sample import put_aside
 
 
 def instruction_set() -> str:
@@ -28,11 +30,16 @@ def extract_shard(job: JobFolder, shard: int, local: Callable[[str], str]) -> Re
 
     local : where this machine has a path of the plan.
     """
-    config = job.read_plan().config.features
+    plan = job.read_plan()
+    config = plan.config.features
+    excluded = job.read_excluded(shard)
     indexed: list[IndexedImage] = []
     skipped: list[Skipped] = []
     found: list[Features] = []
     for row, image in enumerate(job.read_images(shard)):
+        if row in excluded:
+            skipped.append(Skipped(image.uri, excluded[row]))
+            continue
         try:
             decoded, features = image_features(_here(image, local), config)
         except UnusableImage as error:
@@ -43,7 +50,7 @@ def extract_shard(job: JobFolder, shard: int, local: Callable[[str], str]) -> Re
     arrays = _columns(found, config)
     path = job.features(shard)
     outputs = {
-        job.relative(path): write_arrays(path, arrays),
+        job.relative(path): write_arrays(path, {**arrays, **put_aside(indexed, arrays, plan)}),
         job.relative(job.indexed_of_shard(shard)): job.write_indexed(shard, indexed),
     }
     frames = sum(int(arrays[f"{det}/counts"].sum()) for det in config.detectors)
@@ -63,6 +70,15 @@ def extract_shard(job: JobFolder, shard: int, local: Callable[[str], str]) -> Re
     )
     job.write_receipt(receipt)
     return receipt
+
+
+def probe_rows(job: JobFolder, shard: int, rows: range, local: Callable[[str], str]) -> None:
+    """Work on some images of a shard as `extract_shard` does, and keep nothing of it."""
+    config = job.read_plan().config.features
+    images = job.read_images(shard)
+    for row in rows:
+        with suppress(UnusableImage):
+            image_features(_here(images[row], local), config)
 
 
 def _here(image: PosedImage, local: Callable[[str], str]) -> PosedImage:

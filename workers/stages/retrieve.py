@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contracts.config import Descriptor, Detector, FeatureConfig, IndexConfig, SearchConfig
 from contracts.errors import BadConfig
+from contracts.places import place_of
 from contracts.records import Frames, Match
 from index.opened import OpenedIndex
 from index.selecting import candidates
@@ -43,7 +44,7 @@ class Configured(Protocol):
 @lru_cache(maxsize=2)
 def open_index(root: str, generation: int) -> OpenedIndex:
     """One generation of an index, whichever is live by now, open between a process's photos."""
-    return OpenedIndex(Path(root), generation)
+    return OpenedIndex(place_of(root), generation)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""What following costs: empty tasks through Celery, and a million orders without a broker."""

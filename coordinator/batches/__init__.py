@@ -1,0 +1,1 @@
+"""Photos to locate by the thousand: where they are listed, named batches, and their answers."""
