@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.table import print_table
 from contracts.config import IndexConfig, SearchConfig
 from coordinator.cli.show import bars
-from coordinator.engine import running_engine
+from coordinator.engine.running import running_engine
 from coordinator.evaluating import report_of
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys

@@ -23,7 +23,7 @@ from contracts.config import IndexConfig
 from coordinator.building import STAGES
 from coordinator.demo import CONFIG as DEMO_CONFIG
 from coordinator.demo import SHARD_SIZE as DEMO_SHARD_SIZE
-from coordinator.engine import running_engine
+from coordinator.engine.running import running_engine
 from coordinator.indexing import IndexReport, run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import SMALLEST_SHARD, make_plan

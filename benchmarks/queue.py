@@ -25,7 +25,7 @@ from coordinator.batches.running import run_batch
 from coordinator.batches.submitting import submit
 from coordinator.cli.show import Bars
 from coordinator.demo import CONFIG, SHARD_SIZE
-from coordinator.engine import Engine, running_engine
+from coordinator.engine.running import Engine, running_engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

@@ -17,7 +17,7 @@ from benchmarks.table import print_table
 from contracts.config import IndexConfig, SearchConfig
 from contracts.records import PosedImage
 from coordinator.cli.show import bars
-from coordinator.engine import Engine, running_engine
+from coordinator.engine.running import Engine, running_engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

@@ -18,7 +18,7 @@ from contracts.progress import Progress
 from contracts.records import PosedImage
 from coordinator.building import NothingReadable
 from coordinator.committing import Segment, area_around, now, positions_of
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import IndexReport, find_finished, report_of_job, run_and_commit
 from coordinator.intake import Intake, read_surveys
 from coordinator.plan import plan_images

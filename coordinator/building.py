@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contracts.errors import BadIndex, BadSurvey
 from contracts.progress import Progress
 from contracts.records import Receipt
-from coordinator.events import Order
 from coordinator.extracting import Shards, extract_missing
-from coordinator.flow import Outcome
-from coordinator.follow import Follower, value_of
+from coordinator.following.events import Order
+from coordinator.following.flow import Outcome
+from coordinator.following.follow import Follower, value_of
 from index.jobs import JobFolder, JobPlan
 from retrieval.merging import word_ranges
 from workers.messages import job_message

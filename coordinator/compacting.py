@@ -14,7 +14,7 @@ from contracts.errors import BadIndex
 from contracts.progress import Progress
 from coordinator.building import is_built, merge
 from coordinator.committing import area_around, now, positions_of, segment_of
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.plan import free_segment, job_id, write_train_receipts
 from coordinator.watching.watch import watching
 from index.catalogue import CatalogueRow
@@ -65,6 +65,7 @@ def compact(
     job, plan = _plan(index)
     with working(job), watching(job, plan, progress) as watch:
         begin_again(job.path)
+        job.open_again()
         order = _order(index)
         if not is_built(job, plan):
             _write_new_ids(job, index, order)
@@ -77,7 +78,7 @@ def compact(
         with watch.at("commit"):
             generation = _commit(job, plan, index, order)
     if not is_worked_on(job):
-        job.drop_scratch()
+        job.close()
     return CompactReport(job, live, generation, time.perf_counter() - started)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from contracts.progress import Progress
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.export.geojson import provenance, write_geojson
 from coordinator.export.geopackage import write_geopackage
 from coordinator.export.page import write_page

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contracts.progress import Progress
-from coordinator.events import Order
-from coordinator.flow import Outcome
-from coordinator.follow import Follower, value_of
+from coordinator.following.events import Order
+from coordinator.following.flow import Outcome
+from coordinator.following.follow import Follower, value_of
 from coordinator.isolating import isolate
 from index.jobs import JobFolder, JobPlan
 from workers.messages import job_message

@@ -19,7 +19,7 @@ from coordinator.committing import (
     now,
     positions_of,
 )
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.intake import Intake
 from coordinator.watching.watch import watching
 from index.commits import Writer, is_worked_on, working, writing
@@ -100,13 +100,14 @@ def run_and_commit(
     if generation is None:
         with working(job), watching(job, plan, progress) as watch:
             begin_again(job.path)
+            job.open_again()
             if not is_built(job, plan):
                 with engine as running:
                     extracted = build(job, plan, watch.followed(running), watch)
             with watch.at("commit"):
                 generation = _commit(job, plan, intake, assemble)
     if not is_worked_on(job):  # by the same command, run twice at once
-        job.drop_scratch()
+        job.close()
     return report_of_job(job, plan, intake, generation, extracted, started)
 
 

@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from coordinator.events import Order
-from coordinator.flow import Outcome
-from coordinator.follow import Follower, value_of
+from coordinator.following.events import Order
+from coordinator.following.flow import Outcome
+from coordinator.following.follow import Follower, value_of
 from index.jobs import JobFolder, JobPlan
 from workers.messages import job_message
 

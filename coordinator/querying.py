@@ -9,9 +9,9 @@ from contracts.config import SearchConfig, Vote, Weight, Where
 from contracts.errors import TaskFailed
 from contracts.places import Place
 from coordinator.batches.photos import Photo, photo_file
-from coordinator.events import Order
-from coordinator.flow import Outcome
-from coordinator.follow import Follower
+from coordinator.following.events import Order
+from coordinator.following.flow import Outcome
+from coordinator.following.follow import Follower
 from coordinator.holding import HeldAnswers
 from coordinator.truth import JudgedQuery
 from geo.geojson import Feature, Kind, error_feature

@@ -245,6 +245,24 @@ class JobFolder:
             self.path / "skipped.json", json.dumps(rows, indent=1, ensure_ascii=False).encode()
         )
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether nothing is to be done for it any more."""
+        return (self.path / "closed").exists()
+
+    def close(self) -> None:
+        """Nothing is to be done any more: remove what only the job itself needed.
+
+        A worker that was late, or is given a message that was late, sees it and leaves nothing.
+        """
+        if not self.is_closed:
+            write_bytes(self.path / "closed", b"")
+        self.drop_scratch()
+
+    def open_again(self) -> None:
+        """There is work to do, whatever was before."""
+        (self.path / "closed").unlink(missing_ok=True)
+
     def drop_scratch(self) -> None:
         """Remove what only the job itself needed."""
         for name in SCRATCH:

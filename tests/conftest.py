@@ -21,7 +21,7 @@ from PIL import Image
 
 from contracts.config import IndexConfig
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine, running_engine
+from coordinator.engine.running import Engine, running_engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

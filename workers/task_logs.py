@@ -42,7 +42,7 @@ def _take_over(**_: object) -> None:
 
 def _begun(task_id: str, task: Any, args: Any = (), **_: object) -> None:
     ids = {name: value for name, value in _message(args).items() if name in _IDS}
-    key = task_id.split(".", 3)[-1]  # run, number, name, key: coordinator/flow.py
+    key = task_id.split(".", 3)[-1]  # run, number, name, key: coordinator/following/flow.py
     structlog.contextvars.clear_contextvars()
     structlog.contextvars.bind_contextvars(
         **ids, **about(task.name.removeprefix("flaneur."), key), task_id=task_id

@@ -1,7 +1,8 @@
 """The tasks: parse the message, call one stage, return a receipt or a result."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from typing import Any, TypeVar
 
@@ -71,47 +72,51 @@ def task(
 
 @task("extract", messages.ExtractMessage)
 def extract(request: messages.ExtractMessage, roots: Roots) -> Json:
-    job = _job(request)
-    done = job.valid_receipt("extract", f"{request.shard:06d}")
-    return _brief(done or extract_shard(job, request.shard, roots.local), anew=done is None)
+    with _wanted(request) as job:
+        done = job.valid_receipt("extract", f"{request.shard:06d}")
+        return _brief(done or extract_shard(job, request.shard, roots.local), anew=done is None)
 
 
 @task("probe", messages.ProbeMessage)
 def probe(request: messages.ProbeMessage, roots: Roots) -> Json:
-    rows = range(request.first_row, request.stop_row)
-    probe_rows(_job(request), request.shard, rows, roots.local)
+    with _wanted(request) as job:
+        probe_rows(job, request.shard, range(request.first_row, request.stop_row), roots.local)
     return {}
 
 
 @task("train", messages.TrainMessage)
 def train(request: messages.TrainMessage, _: Roots) -> Json:
-    job = _job(request)
-    done = job.valid_receipt("train", request.channel)
-    if done is not None:
-        return _brief(done, anew=False)
-    n_threads = _threads_each(len(job.read_plan().config.features.channels()))
-    return _brief(train_channel(job, request.channel, n_threads))
+    with _wanted(request) as job:
+        done = job.valid_receipt("train", request.channel)
+        if done is not None:
+            return _brief(done, anew=False)
+        n_threads = _threads_each(len(job.read_plan().config.features.channels()))
+        return _brief(train_channel(job, request.channel, n_threads))
 
 
 @task("assign", messages.AssignMessage)
 def assign(request: messages.AssignMessage, _: Roots) -> Json:
-    job, first_id = _job(request), request.first_image_id
-    done = job.assigned(request.shard, job.words_digest(job.read_plan().config.features.channels()))
-    if done is not None and done.counts["first_image_id"] == first_id:
-        return _brief(done, anew=False)
-    return _brief(assign_shard(job, request.shard, first_id))
+    first_id = request.first_image_id
+    with _wanted(request) as job:
+        words = job.words_digest(job.read_plan().config.features.channels())
+        done = job.assigned(request.shard, words)
+        if done is not None and done.counts["first_image_id"] == first_id:
+            return _brief(done, anew=False)
+        return _brief(assign_shard(job, request.shard, first_id))
 
 
 @task("merge", messages.MergeMessage)
 def merge(request: messages.MergeMessage, _: Roots) -> Json:
     words = range(request.first_word, request.stop_word)
-    return _brief(merge_words(_job(request), request.channel, words, request.n_images))
+    with _wanted(request) as job:
+        return _brief(merge_words(job, request.channel, words, request.n_images))
 
 
 @task("join", messages.JoinMessage)
 def join(request: messages.JoinMessage, _: Roots) -> Json:
-    job, pieces = _job(request), request.first_words
-    return _brief(join_channel(job, request.channel, pieces, request.n_images))
+    pieces = request.first_words
+    with _wanted(request) as job:
+        return _brief(join_channel(job, request.channel, pieces, request.n_images))
 
 
 @task("locate", messages.LocateMessage)
@@ -141,17 +146,24 @@ def _pause(envelope: object) -> float:
     return min(float(lease_s) if isinstance(lease_s, int | float) else 0.0, LEASE_S) / RENEWALS
 
 
-def _job(request: JobMessage) -> JobFolder:
-    """The folder of a job that is still wanted.
+@contextmanager
+def _wanted(request: JobMessage) -> Iterator[JobFolder]:
+    """The folder of a job that is still wanted, to work in.
 
     Raises
     ------
-    Cancelled : it is not. Refused : as `JobMessage.folder`.
+    Cancelled, Withdrawn : it is not. Refused : as `JobMessage.folder`.
     """
     job = request.folder()
     if read_wish(job.path) == "cancel":
         raise Cancelled(f"job {job.job} is cancelled.")
-    return job
+    if job.is_closed:
+        raise Withdrawn(f"job {job.job} is done.")
+    try:
+        yield job
+    finally:
+        if job.is_closed:  # another did the same, and sooner
+            job.drop_scratch()
 
 
 def _threads_each(n_tasks: int) -> int:

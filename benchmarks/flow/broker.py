@@ -13,9 +13,9 @@ from redis import Redis
 
 from benchmarks.flow.empty import N_PROCESSES, routed
 from benchmarks.table import print_table
-from coordinator.embedded import embedded_server
-from coordinator.events import Order
-from coordinator.follow import Follower
+from coordinator.engine.embedded import embedded_server
+from coordinator.following.events import Order
+from coordinator.following.follow import Follower
 from workers.app import make_app, queue_key
 from workers.server import connect
 

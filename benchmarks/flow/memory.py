@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 
 from benchmarks.table import print_table
-from coordinator.carrying import Landing, Sighting
-from coordinator.events import Order, unheard
-from coordinator.flow import Ears, Flow, Terms
+from coordinator.following.carrying import Landing, Sighting
+from coordinator.following.events import Order, unheard
+from coordinator.following.flow import Ears, Flow, Terms
 
 IN_FLIGHT = 2560
 """40 machines of 16 processes."""

@@ -18,7 +18,7 @@ from benchmarks.sets.run import OUT as SETS
 from benchmarks.stereopolis import FIRST_PASS, index_first_pass, second_pass
 from contracts.config import IndexConfig
 from coordinator.demo import CONFIG as DEMO_CONFIG
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from geo.crs import ToWgs84
 from index.opened import OpenedIndex
 from survey import ReadOptions

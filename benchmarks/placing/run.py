@@ -19,7 +19,7 @@ from benchmarks.placing.report import (
     print_with_and_without,
 )
 from benchmarks.sets.collections import SEEDS
-from coordinator.engine import running_engine
+from coordinator.engine.running import running_engine
 from geo.confidence import PlacingModel
 
 REPOSITORY = Path(__file__).parents[2]

@@ -13,9 +13,9 @@ import psutil
 from benchmarks.scaling.measured import Channel, RealJob, Spent
 from contracts.config import DESCRIPTOR_SIZES, IndexConfig
 from coordinator.building import STAGES
-from coordinator.engine import Engine, running_engine
-from coordinator.events import Event, Order
-from coordinator.follow import go_on
+from coordinator.engine.running import Engine, running_engine
+from coordinator.following.events import Event, Order
+from coordinator.following.follow import go_on
 from coordinator.indexing import run_job
 from coordinator.intake import Intake
 from coordinator.plan import make_plan

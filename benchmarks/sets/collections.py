@@ -16,7 +16,7 @@ from typing import Any
 from contracts.config import DESCRIPTORS, IndexConfig, SearchConfig
 from coordinator.cli.show import bars
 from coordinator.demo import CONFIG as DEMO_CONFIG
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import SMALLEST_SHARD, make_plan

@@ -14,7 +14,7 @@ from coordinator.comparing.choices import Choices, choices_of
 from coordinator.comparing.report import write_comparison
 from coordinator.comparing.results import Results, joined_results, results_of
 from coordinator.comparing.tables import controls_table
-from coordinator.engine import running_engine
+from coordinator.engine.running import running_engine
 from coordinator.export.tables import markdown, write_tables
 from retrieval.choice_fit import fit_choice
 

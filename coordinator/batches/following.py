@@ -11,8 +11,8 @@ from coordinator.batches.batch import BatchFolder
 from coordinator.batches.fetching import Fetcher
 from coordinator.batches.running import open_pinned, run_batch
 from coordinator.batches.watch import Watch
-from coordinator.broker import BROKER_VARIABLE
-from coordinator.engine import available_cores, running_engine
+from coordinator.engine.broker import BROKER_VARIABLE
+from coordinator.engine.running import available_cores, running_engine
 
 QUEUES = ("locate",)
 

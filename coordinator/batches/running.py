@@ -12,9 +12,9 @@ from coordinator.batches.batch import BatchFolder, BatchPlan
 from coordinator.batches.fetching import Fetcher
 from coordinator.batches.journal import Answers, Journal, is_error
 from coordinator.batches.preparing import Preparing, Ready
-from coordinator.engine import Engine
-from coordinator.events import Order
-from coordinator.flow import Outcome
+from coordinator.engine.running import Engine
+from coordinator.following.events import Order
+from coordinator.following.flow import Outcome
 from coordinator.querying import answer_of, locate_message
 from index.opened import OpenedIndex
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from coordinator.batches.batch import BatchFolder, BatchPlan
 from coordinator.batches.running import STAGE
-from coordinator.events import Event
+from coordinator.following.events import Event
 from coordinator.watching.journal import utc_now
 from coordinator.watching.pace import Pace
 from coordinator.watching.progress import (

@@ -62,7 +62,7 @@ def command(
     again.
     """
     from coordinator.adding import find_new, plan_addition, run_addition
-    from coordinator.engine import JOB_QUEUES, running_engine
+    from coordinator.engine.running import JOB_QUEUES, running_engine
     from index.opened import OpenedIndex
 
     started = time.perf_counter()

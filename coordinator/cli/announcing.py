@@ -12,7 +12,7 @@ from contracts.progress import Progress
 from coordinator.cli.show import bars, tell
 
 if TYPE_CHECKING:  # prometheus_client and pydantic are imported when a verb runs
-    from coordinator.events import Event, Listener
+    from coordinator.following.events import Event, Listener
     from coordinator.watching.counting import OrderCounts
     from index.jobs import JobFolder
 

@@ -45,7 +45,7 @@ def command(
     """
     from coordinator import pruning
     from coordinator.compacting import compact
-    from coordinator.engine import running_engine
+    from coordinator.engine.running import running_engine
 
     root = index.absolute()
     with announced(metrics_port, metrics_address) as watchers:

@@ -24,7 +24,7 @@ def command(
 ) -> None:
     """Render a small town, index it, and locate old photos of it."""
     from coordinator.demo import run_demo
-    from coordinator.engine import running_engine
+    from coordinator.engine.running import running_engine
 
     started = time.perf_counter()
     with running_engine(None, workers) as engine, bars() as progress:

@@ -53,7 +53,7 @@ def command(
 ) -> int:
     """Search for every query of a ground truth and score the rankings."""
     from coordinator.comparing.report import check_comparable, compare
-    from coordinator.engine import running_engine
+    from coordinator.engine.running import running_engine
     from coordinator.evaluating import report_of, table_of, write_sheets
     from coordinator.export.files import write_whole
     from coordinator.querying import judge_queries

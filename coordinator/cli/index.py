@@ -86,7 +86,7 @@ def command(
 ) -> int:
     """Index a survey. Run again, it does only what is missing."""
     from coordinator.adding import before_replacing
-    from coordinator.engine import JOB_QUEUES, running_engine
+    from coordinator.engine.running import JOB_QUEUES, running_engine
     from coordinator.indexing import run_job
     from coordinator.intake import read_surveys
     from coordinator.plan import make_plan

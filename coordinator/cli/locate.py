@@ -71,8 +71,8 @@ def command(
 ) -> int:
     """Find where photos were taken."""
     from coordinator.batches.at_once import photos_at_hand, seen_by_workers
-    from coordinator.broker import broker_url
-    from coordinator.engine import available_cores, running_engine
+    from coordinator.engine.broker import broker_url
+    from coordinator.engine.running import available_cores, running_engine
     from coordinator.export.geojson import encoded, provenance
     from coordinator.export.results import (
         features_of,
@@ -85,8 +85,9 @@ def command(
     search = search_config(pair, k, vote, weights, descriptors, top)
     opened = opened_index(index)
     search = fitted_search(search, vote, opened.config.features)
-    refuse_unknown([result_file(each) for each in out or ()])
-    refuse_unwritable([result_file(each) for each in out or ()])
+    outs = [result_file(each, map(Path, sources)) for each in out or ()]
+    refuse_unknown(outs)
+    refuse_unwritable(outs)
     where = where_of(
         opened.generation, bbox, within, since, until, heading, surveys=survey, uris=uri
     )
@@ -98,8 +99,8 @@ def command(
         photos = stack.enter_context(
             photos_at_hand(sources, seen_by_workers(index, broker_url(broker)), progress)
         )
-        inputs = [Path(each) for each in (*sources, *(photo.path for photo in photos)) if each]
-        outs = [result_file(each, inputs) for each in out or ()]
+        for each in outs:  # a folder or a list may name one of them
+            result_file(each, (Path(photo.path) for photo in photos if photo.path))
         count = min(workers or len(photos), len(photos), available_cores())
         engine = stack.enter_context(running_engine(broker, count, ("locate",)))
         progress.begin("locate", len(photos), 0)

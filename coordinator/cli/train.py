@@ -50,7 +50,7 @@ def command(
 ) -> int:
     """Fit the model that chooses detectors and k for each photo (Eq. 1 of the paper)."""
     from coordinator.comparing.report import check_comparable
-    from coordinator.engine import running_engine
+    from coordinator.engine.running import running_engine
     from coordinator.export.files import write_whole
     from coordinator.querying import Rules, rehearse_queries
     from coordinator.training import train_model

@@ -51,7 +51,7 @@ def present_at(broker: str | None) -> Callable[[], str | None]:
     """
     if broker is None:
         return lambda: None
-    from coordinator.broker import check_broker
+    from coordinator.engine.broker import check_broker
     from workers.presence import listening
 
     server = check_broker(broker)

@@ -39,9 +39,9 @@ def command(
     with_parent: Annotated[bool, typer.Option("--with-parent", hidden=True)] = False,
 ) -> int:
     """Work for a coordinator; stop with Ctrl-C or SIGTERM: what is begun is finished first."""
-    from coordinator.broker import BROKER_VARIABLE, broker_url, check_broker
-    from coordinator.engine import available_cores
-    from coordinator.exposure import exposure
+    from coordinator.engine.broker import BROKER_VARIABLE, broker_url, check_broker
+    from coordinator.engine.exposure import exposure
+    from coordinator.engine.running import available_cores
     from workers.app import QUEUES
     from workers.metrics import serve_worker
     from workers.roots import roots_here

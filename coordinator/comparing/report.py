@@ -18,7 +18,7 @@ from coordinator.comparing.tables import paper_tables
 from coordinator.export.figures import draw_intervals, draw_shares
 from coordinator.export.files import write_whole
 from coordinator.export.tables import write_tables
-from coordinator.follow import Follower
+from coordinator.following.follow import Follower
 from coordinator.querying import Rules, rehearse_queries
 from coordinator.training import places_of
 from coordinator.truth import JudgedQuery

@@ -2,7 +2,7 @@
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
 
-from coordinator.events import Event
+from coordinator.following.events import Event
 from workers.metrics import SECONDS
 
 _ENDS = ("done", "failed", "given_up")

@@ -2,7 +2,7 @@
 
 import logging
 
-from coordinator.events import Event, Kind
+from coordinator.following.events import Event, Kind
 from workers.logs import about, logger
 
 _LEVELS: dict[Kind, int] = {

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 
-from coordinator.events import Event
+from coordinator.following.events import Event
 from coordinator.watching.journal import MAX_TOLD, Record, utc_now
 from coordinator.watching.pace import Pace
 from coordinator.watching.progress import AtWork, JobProgress, StageProgress, State
@@ -37,7 +37,6 @@ class Tally:
         self._counts: Counter[str] = Counter()
         self._told = ""
         self._orders, self._images = Pace(), Pace()
-        self._images_done = 0
         self._skipped = {record.key: record.skipped for record in former if record.skipped}
         self._begun_at = utc_now()
         self._beat = 0
@@ -49,7 +48,6 @@ class Tally:
         self._orders = Pace()
         if stage == "extract":
             self._images = Pace()
-            self._images_done = min(done * self._plan.shard_size, self._plan.n_images)
 
     def advance(self, stage: str) -> None:
         """One order of a stage is done."""
@@ -58,8 +56,7 @@ class Tally:
         self._orders.add()
 
     def extracted(self, key: str, images: int, skipped: int) -> None:
-        """A shard was extracted: so many of its images were read, so many were not."""
-        self._images_done = min(self._images_done + images + skipped, self._plan.n_images)
+        """Of a shard so many images were read just now, and so many could not be."""
         self._images.add(images + skipped)
         self._skipped[key] = skipped
 
@@ -71,6 +68,10 @@ class Tally:
             self._orders, self._images = Pace(), Pace()  # the time of standing still says nothing
         if event.told:
             self._told = event.told[:MAX_TOLD]
+
+    def _images_done(self) -> int:
+        shards = self._stages["extract"].done if "extract" in self._stages else 0
+        return min(shards * self._plan.shard_size, self._plan.n_images)
 
     def end(self, state: State, told: str = "") -> None:
         """The run is over."""
@@ -91,7 +92,7 @@ class Tally:
             stage=self._stage,
             stages=tuple(self._stages.values()),
             images=self._plan.n_images,
-            images_done=self._images_done,
+            images_done=self._images_done(),
             images_per_s=self._images.per_s() if works and self._stage == "extract" else None,
             stage_left_s=stage_left_s,
             left_s=stage_left_s if self._stage == LAST else None,

@@ -16,9 +16,9 @@ from structlog.contextvars import bound_contextvars
 
 from contracts.errors import BadIndex, Cancelled
 from contracts.progress import Progress
-from coordinator.engine import Engine
-from coordinator.events import Event
-from coordinator.follow import Follower
+from coordinator.engine.running import Engine
+from coordinator.following.events import Event
+from coordinator.following.follow import Follower
 from coordinator.watching.at_work import at_work
 from coordinator.watching.journal import Journal, Record, read_journal, utc_now
 from coordinator.watching.progress import AtWork, State, write_progress
@@ -80,8 +80,9 @@ class Watch:
         """Something happened to an order: a `Listener`."""
         images = skipped = 0
         stage, key = (event.order.name, event.order.key) if event.order else ("", "")
-        if event.kind == "done" and stage == "extract":
-            images, skipped = self._images_of(key)
+        if event.kind == "done" and stage == "extract" and event.value is not None:
+            counts = event.value["counts"]
+            images, skipped = counts["images"] if event.value["anew"] else 0, counts["skipped"]
         with self._lock:
             self._tally.hear(event)
             if images or skipped:
@@ -89,10 +90,6 @@ class Watch:
         if event.kind != "sent":
             told = (event.kind, stage, key, event.worker, event.seconds, event.told)
             self._write(Record(utc_now(), *told, images=images, skipped=skipped))
-
-    def _images_of(self, key: str) -> tuple[int, int]:
-        receipt = self._job.read_receipt("extract", key)
-        return (receipt.counts["images"], receipt.counts["skipped"]) if receipt else (0, 0)
 
     def start(self) -> None:
         """A coordinator begins to work on the job."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from contracts.config import FeatureConfig, IndexConfig
 from contracts.records import Receipt, Skipped
-from coordinator.events import Event, Order
+from coordinator.following.events import Event, Order
 from coordinator.watching.watch import Watch
 from index.jobs import JobFolder, JobPlan
 
@@ -38,12 +38,13 @@ def order(stage: str, number: int) -> Order:
     return Order(stage, f"{number:06d}", {})
 
 
-def extract(job: JobFolder, watch: Watch, shard: int, *skipped: Skipped) -> None:
+def extract(job: JobFolder, watch: Watch, shard: int, *skipped: Skipped, anew: bool = True) -> None:
     """A shard is extracted: its receipt is there, and then the follower hears of it."""
     n_images = min(SHARD_SIZE, N_IMAGES - shard * SHARD_SIZE)
     counts = {"images": n_images - len(skipped), "skipped": len(skipped)}
     job.write_receipt(Receipt("extract", f"{shard:06d}", {}, counts, skipped))
     watch.hear(Event("sent", order("extract", shard)))
     worker = WORKERS[shard % 2]
-    watch.hear(Event("done", order("extract", shard), worker, 1.5 + shard))
+    value = {"counts": counts, "anew": anew}
+    watch.hear(Event("done", order("extract", shard), worker, 1.5 + shard, value=value))
     watch.advance("extract")

@@ -9,7 +9,7 @@ from rich.console import Console
 from coordinator.cli.demo import _summary, _table
 from coordinator.cli.show import Bars
 from coordinator.demo import Answer, DemoReport, run_demo
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from survey.synthetic import ShotOptions
 
 CORNER = ShotOptions(width_px=400, height_px=300, n_queries=4, max_stops=4)

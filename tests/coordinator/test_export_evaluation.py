@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.cli import main
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.evaluating import MAX_SHEETS, report_of, write_sheets
 from coordinator.export.evaluation import JudgedSheet, write_evaluation_page
 from coordinator.export.sheets import BOX_RGB, SheetMatch, thumbnail_jpeg

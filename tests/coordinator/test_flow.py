@@ -8,10 +8,10 @@ import pytest
 
 from benchmarks.flow.memory import MemoryCourier, shards
 from contracts.errors import BadIndex, BrokerUnreachable, Cancelled
-from coordinator import flow as flow_module
-from coordinator.carrying import BrokerAway, Landing, Sighting
-from coordinator.events import Event, Order
-from coordinator.flow import Ears, Flow, Outcome, Terms
+from coordinator.following import flow as flow_module
+from coordinator.following.carrying import BrokerAway, Landing, Sighting
+from coordinator.following.events import Event, Order
+from coordinator.following.flow import Ears, Flow, Outcome, Terms
 from index.control import Wish
 
 TERMS = Terms(lease_s=0.06, outage_s=0.1)

@@ -12,11 +12,11 @@ import pytest
 from contracts.config import SearchConfig
 from contracts.errors import BadConfig, TaskFailed, WrongInput
 from coordinator.batches.photos import Photo, photo_file
-from coordinator.events import Order
 from coordinator.export.geojson import write_geojson
 from coordinator.export.results import refuse_unknown, refuse_unwritable, write_results
-from coordinator.flow import Outcome
-from coordinator.follow import Follower
+from coordinator.following.events import Order
+from coordinator.following.flow import Outcome
+from coordinator.following.follow import Follower
 from coordinator.holding import IN_MEMORY_BYTES, HeldAnswers
 from coordinator.querying import Located, locate_photos
 from geo.geojson import Feature, PlacedMatch, error_feature, match_feature

@@ -16,7 +16,7 @@ from contracts.config import DETECTORS, CodebookConfig, FeatureConfig, IndexConf
 from contracts.records import Frames
 from coordinator.cli import main
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.export.inspection import CHOSEN_RGB, picture
 from coordinator.indexing import run_job
 from coordinator.inspecting import Inspection, NoIndex, Seen, coverage

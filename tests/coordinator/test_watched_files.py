@@ -7,12 +7,12 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from made_follower import N_IMAGES, N_SHARDS, WORKERS, extract, made_job, order
+from made_follower import N_IMAGES, N_SHARDS, SHARD_SIZE, WORKERS, extract, made_job, order
 
 from contracts.errors import Cancelled, TaskFailed
 from contracts.records import Skipped
 from coordinator.cli.show import Bars
-from coordinator.events import Event
+from coordinator.following.events import Event
 from coordinator.watching.journal import Journal, Record, path_of, read_journal
 from coordinator.watching.pace import AT_LEAST, WINDOW_S, Pace
 from coordinator.watching.progress import read_progress
@@ -88,9 +88,19 @@ def test_progress_counts_what_earlier_runs_did_and_skipped(tmp_path: Path) -> No
     assert [(each.name, each.total, each.done) for each in progress.stages] == [
         ("extract", N_SHARDS, 2)
     ]
-    assert progress.images_done == 3 + 2
+    assert progress.images_done == 2 * SHARD_SIZE
     assert progress.skipped == 1
     assert progress.state == "finished"
+
+
+def test_shards_that_were_there_already_are_not_counted_as_extracted_again(tmp_path: Path) -> None:
+    job, plan = made_job(tmp_path)
+    for anew in (True, False):
+        with watching(job, plan, Bars(None)) as watch:
+            watch.begin("extract", N_SHARDS, 0)
+            for shard in range(N_SHARDS):
+                extract(job, watch, shard, anew=anew)
+    assert report_of(job).images_extracted == N_IMAGES
 
 
 def test_nothing_is_promised_before_anything_is_known(tmp_path: Path) -> None:

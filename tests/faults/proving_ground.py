@@ -15,6 +15,7 @@ from switches import STAGES, Switches
 from waiting import PATIENCE_S, wait_until
 
 REPOSITORY = Path(__file__).parents[2]
+INSIDE = Path(__file__).parent / "inside_processes"
 FLANEUR = (sys.executable, "-m", "coordinator.cli")
 LEASE_S = 2
 N_WORKERS = 2
@@ -80,8 +81,8 @@ class Ground:
         self.replenish()
         self.wait_for_workers()
 
-    def start(self, arguments: tuple[str, ...], skew_s: int = 0, *first: Path) -> "Started":
-        """A `flaneur` process in a session of its own. first : of the places of its modules."""
+    def start(self, arguments: tuple[str, ...], skew_s: int = 0, switches: str = "") -> "Started":
+        """A `flaneur` process in a session of its own. switches : the folder that it heeds."""
         self._n_started += 1
         log = self.folder / f"{self._n_started:04d}-{arguments[0]}.log"
         with log.open("wb") as stream:
@@ -93,17 +94,17 @@ class Ground:
                 start_new_session=True,
                 env={
                     **os.environ,
-                    "PYTHONPATH": os.pathsep.join(map(str, (*first, REPOSITORY))),
+                    "PYTHONPATH": f"{INSIDE}{os.pathsep}{REPOSITORY}",
                     "FLANEUR_LEASE_S": str(LEASE_S),
-                    "FLANEUR_TEST_FAULTS": str(self.switches.folder),
+                    "FLANEUR_TEST_FAULTS": switches,
                     **(_skewed_clock(skew_s) if skew_s else {}),
                 },
             )
         return Started(process, log)
 
     def _start_worker(self, skew_s: int) -> "subprocess.Popen[bytes]":
-        inside = REPOSITORY / "tests" / "faults" / "inside_workers"
-        process = self.start(("worker", "--processes", "1"), skew_s, inside).process
+        arguments = ("worker", "--processes", "1")
+        process = self.start(arguments, skew_s, str(self.switches.folder)).process
         if skew_s:
             self._skewed.add(process.pid)
         return process

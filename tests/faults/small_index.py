@@ -19,9 +19,9 @@ from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, Where
 from contracts.records import Receipt
 from coordinator.adding import plan_addition, run_addition
 from coordinator.compacting import compact
-from coordinator.engine import Engine
-from coordinator.events import Order
-from coordinator.flow import Outcome
+from coordinator.engine.running import Engine
+from coordinator.following.events import Order
+from coordinator.following.flow import Outcome
 from coordinator.indexing import run_job
 from coordinator.intake import Intake, read_surveys
 from coordinator.plan import make_plan

@@ -118,7 +118,11 @@ def photographed(root: Path, shots: Path, work: Callable[[], object]) -> None:
 
     def keep(kind: str, _path: str | None) -> None:
         if kind != "fsync":  # before and after it the files are the same
-            shutil.copytree(root, shots / f"{len(list(shots.iterdir())):03d}")
+            shot = shots / f"{len(list(shots.iterdir())):03d}"
+            shutil.copytree(root, shot, ignore=being_told)
+
+    # A thread of its own writes it, and renames it at any moment.
+    being_told = shutil.ignore_patterns(".progress.json.*")
 
     def watched() -> None:
         Writes(root, keep).install()

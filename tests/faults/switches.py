@@ -1,4 +1,4 @@
-"""Turning on and off what `inside_workers/sitecustomize.py` does inside every worker."""
+"""Turning on and off what `inside_processes/sitecustomize.py` does inside every worker."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

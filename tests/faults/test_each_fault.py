@@ -6,6 +6,7 @@ A worker is held where it is about to write, so that the fault meets it in the m
 import os
 import signal
 import subprocess
+import time
 
 import psutil
 import pytest
@@ -71,6 +72,20 @@ def test_a_coordinator_that_is_killed_goes_on_when_run_again(
 
 
 @stages()
+def test_what_a_coordinator_and_a_worker_took_to_their_graves_is_not_done_hours_later(
+    command: Command, undisturbed: Undisturbed, stage: str
+) -> None:
+    with command.ground.switches.holding(stage) as first_held:
+        command.begin()
+        kill_group(worker_of(command.ground, first_held()))
+        command.kill()
+        command.begin()
+    assert command.ended() == 0
+    assert command.ground.server.untold()
+    assert_well(command, undisturbed.contents())
+
+
+@stages()
 def test_a_server_that_comes_back_with_its_data_costs_nothing(
     command: Command, undisturbed: Undisturbed, stage: str
 ) -> None:
@@ -91,6 +106,21 @@ def test_a_server_that_comes_back_with_nothing_costs_nothing(
         first_held()
         command.ground.server.stop()
         command.ground.server.start(with_data=False)
+    assert_well(command, undisturbed.contents())
+
+
+@stages()
+def test_a_task_that_ends_while_the_server_is_away_has_not_failed(
+    command: Command, undisturbed: Undisturbed, stage: str
+) -> None:
+    with command.ground.switches.holding(stage) as first_held:
+        command.begin()
+        child = first_held()
+        name, key = command.ground.server.at_work()[child].split(" ", 1)
+        command.ground.server.stop()
+    wait_until(lambda: key in command.receipts(name), "the task to end")
+    time.sleep(1)  # until it has tried to tell so
+    command.ground.server.start(with_data=True)
     assert_well(command, undisturbed.contents())
 
 

@@ -112,7 +112,7 @@ def test_a_job_outlives_a_worker_that_is_cut_off_and_the_worker_outlives_it_too(
 
 EXPOSED = """
 import sys
-from coordinator.exposure import exposure
+from coordinator.engine.exposure import exposure
 from workers.server import connect
 print(exposure(sys.argv[1], connect(sys.argv[1])))
 """

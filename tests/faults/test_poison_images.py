@@ -12,7 +12,7 @@ import pytest
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig
 from coordinator import extracting, isolating
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine, running_engine
+from coordinator.engine.running import Engine, running_engine
 from coordinator.indexing import IndexReport, run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

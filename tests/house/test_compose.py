@@ -13,7 +13,7 @@ import yaml
 from machines import DEBIANS_REDIS, VALKEY, free_port, redis_server
 
 from contracts.errors import BrokerUnreachable
-from coordinator.broker import check_broker
+from coordinator.engine.broker import check_broker
 from workers.app import QUEUES
 from workers.roots import PREFIX
 

@@ -13,7 +13,7 @@ from PIL import Image
 
 from contracts.config import IndexConfig
 from coordinator.compacting import compact
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from index.opened import OpenedIndex
 
 
@@ -48,7 +48,9 @@ def life(
 @pytest.fixture
 def same_engine(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     """All commands use the tests' engine; asking a broker who listens takes two seconds."""
-    monkeypatch.setattr("coordinator.engine.running_engine", lambda *_, **__: nullcontext(engine))
+    monkeypatch.setattr(
+        "coordinator.engine.running.running_engine", lambda *_, **__: nullcontext(engine)
+    )
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, Where
 from coordinator.adding import find_new, plan_addition, run_addition
 from coordinator.cli.show import Bars
 from coordinator.compacting import CompactReport
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import IndexReport, run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

@@ -21,7 +21,7 @@ from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchC
 from contracts.errors import BadIndex
 from coordinator.cli import main
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

@@ -31,7 +31,7 @@ from coordinator.batches.states import state_of_batch
 from coordinator.batches.submitting import submit
 from coordinator.cli import main
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.pruning import prune
 from coordinator.querying import Located, locate_message, locate_photos
 from coordinator.removing import remove_images

@@ -8,8 +8,8 @@ import pytest
 from machines import DEBIANS_REDIS, free_port, make_certificate, redis_server
 
 from contracts.errors import BrokerUnreachable
-from coordinator.broker import check_broker, check_workers
-from coordinator.exposure import exposure
+from coordinator.engine.broker import check_broker, check_workers
+from coordinator.engine.exposure import exposure
 from workers.messages import our_version
 from workers.presence import listening
 from workers.server import connect, settled, without_password

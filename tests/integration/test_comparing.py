@@ -14,7 +14,7 @@ from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchC
 from contracts.errors import WrongInput
 from coordinator.cli.show import Bars
 from coordinator.comparing.report import check_comparable, compare
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.querying import WEIGHTINGS, Rules, judge_queries
 from coordinator.truth import JudgedQuery, read_truth
 from index.opened import OpenedIndex

@@ -8,9 +8,9 @@ import pytest
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig
 from coordinator.cli.show import Bars
-from coordinator.courier import RedisCourier
-from coordinator.engine import Engine
-from coordinator.events import Order
+from coordinator.engine.running import Engine
+from coordinator.following.courier import RedisCourier
+from coordinator.following.events import Order
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

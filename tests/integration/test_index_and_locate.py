@@ -14,7 +14,7 @@ from flaneur_command import FLANEUR, run
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine, running_engine
+from coordinator.engine.running import Engine, running_engine
 from coordinator.indexing import IndexReport, run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

@@ -13,7 +13,7 @@ import pytest
 from living_index import BARS, CHANNELS, CONFIG, DEGREES, LAMBERT_93, REMOVED, Life, contents
 
 from contracts.config import SearchConfig
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import run_job
 from coordinator.intake import Intake, read_surveys
 from coordinator.plan import make_plan

@@ -21,7 +21,7 @@ from contracts.config import (
 )
 from contracts.errors import BadTruth
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.export.stac_folder import write_stac
 from coordinator.querying import Json, Rules, judge_queries, rehearse_queries, votes_file
 from coordinator.removing import remove_images

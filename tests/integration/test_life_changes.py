@@ -27,7 +27,7 @@ from contracts.errors import BadConfig, BadIndex
 from coordinator.adding import find_new, plan_addition, run_addition
 from coordinator.cli.show import Bars
 from coordinator.compacting import compact
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

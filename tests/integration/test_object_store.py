@@ -10,7 +10,7 @@ from object_store import Bucket
 
 from contracts.places import Place, place_of
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

@@ -12,8 +12,8 @@ import pytest
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from contracts.errors import Cancelled
-from coordinator.engine import Engine
-from coordinator.events import Order
+from coordinator.engine.running import Engine
+from coordinator.following.events import Order
 from coordinator.querying import locate_photos
 from index.jobs import JobFolder
 from index.opened import OpenedIndex

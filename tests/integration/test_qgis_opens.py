@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.export.geopackage import write_geopackage
 from coordinator.export.geopackage.layers import LAYERS
 from coordinator.querying import Located, locate_photos

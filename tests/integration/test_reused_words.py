@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.cli import main
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.querying import locate_photos
 from index.opened import OpenedIndex
 

@@ -12,7 +12,7 @@ import pytest
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig, SearchConfig
 from coordinator.cli.show import Bars
-from coordinator.engine import Engine
+from coordinator.engine.running import Engine
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

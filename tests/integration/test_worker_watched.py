@@ -22,9 +22,9 @@ from contracts.config import FeatureConfig, IndexConfig
 from contracts.errors import BadConfig
 from coordinator.cli.announcing import announced
 from coordinator.cli.show import Bars
-from coordinator.embedded import embedded_server
-from coordinator.engine import JOB_QUEUES, running_engine
-from coordinator.events import Event, Order
+from coordinator.engine.embedded import embedded_server
+from coordinator.engine.running import JOB_QUEUES, running_engine
+from coordinator.following.events import Event, Order
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

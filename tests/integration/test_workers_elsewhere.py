@@ -22,10 +22,10 @@ from machines import (
 
 from contracts.config import CodebookConfig, FeatureConfig, IndexConfig
 from contracts.errors import BrokerUnreachable, TaskFailed
-from coordinator.broker import check_workers
 from coordinator.cli.show import Bars
-from coordinator.engine import JOB_QUEUES, Engine, running_engine
-from coordinator.events import Event, Listener, unheard
+from coordinator.engine.broker import check_workers
+from coordinator.engine.running import JOB_QUEUES, Engine, running_engine
+from coordinator.following.events import Event, Listener, unheard
 from coordinator.indexing import run_job
 from coordinator.intake import read_surveys
 from coordinator.plan import make_plan

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from redis import Redis
 
-from coordinator.embedded import embedded_server
+from coordinator.engine.embedded import embedded_server
 from workers.lease import (
     MAX_STARTS,
     GivenUp,

@@ -9,9 +9,9 @@ from typing import Any
 from celery import Celery
 
 from contracts.errors import BadConfig, TaskFailed
-from coordinator.courier import RedisCourier
-from coordinator.events import Event, Listener, Order, unheard
-from coordinator.flow import Ears, Flow, Outcome, Terms
+from coordinator.following.courier import RedisCourier
+from coordinator.following.events import Event, Listener, Order, unheard
+from coordinator.following.flow import Ears, Flow, Outcome, Terms
 from index.control import Wish
 from workers.lease import LEASE_S
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from coordinator.events import Order
+from coordinator.following.events import Order
 
 Json = dict[str, Any]
 

@@ -14,8 +14,8 @@ from kombu.exceptions import BatchPublishError, OperationalError
 from kombu.messaging import Producer
 from redis import Redis, RedisError
 
-from coordinator.carrying import BrokerAway, Landing, Sighting
-from coordinator.events import Order
+from coordinator.following.carrying import BrokerAway, Landing, Sighting
+from coordinator.following.events import Order
 from workers.app import QUEUES, queue_key
 from workers.lease import (
     LANDED_KEPT_S,

@@ -16,12 +16,12 @@ from pathlib import Path
 
 from celery import Celery
 
-from coordinator.broker import broker_url, check_broker, check_workers
-from coordinator.embedded import embedded_server
-from coordinator.events import Listener, unheard
-from coordinator.exposure import exposure
-from coordinator.follow import Follower, go_on
-from coordinator.local_workers import LocalWorkers
+from coordinator.engine.broker import broker_url, check_broker, check_workers
+from coordinator.engine.embedded import embedded_server
+from coordinator.engine.exposure import exposure
+from coordinator.engine.local_workers import LocalWorkers
+from coordinator.following.events import Listener, unheard
+from coordinator.following.follow import Follower, go_on
 from index.control import Wish
 from workers.app import QUEUES, make_app
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from contracts.errors import BadConfig, BadIndex, BrokerUnreachable, Cancelled
-from coordinator.carrying import BrokerAway, Courier, Landing, Sighting
-from coordinator.events import Event, Kind, Listener, Order
+from coordinator.following.carrying import BrokerAway, Courier, Landing, Sighting
+from coordinator.following.events import Event, Kind, Listener, Order
 from index.control import Wish
 
 T = TypeVar("T")

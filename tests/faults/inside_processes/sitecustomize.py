@@ -1,4 +1,4 @@
-"""Faults inside a worker's processes that nobody can produce from outside, heard at every file.
+"""Faults inside a process that nobody can produce from outside, heard at every file.
 
 `FLANEUR_TEST_FAULTS` names a folder of switches, empty files that a test makes and removes:
 
@@ -8,6 +8,7 @@
 """
 
 import os
+import select
 import signal
 import sys
 import time
@@ -53,3 +54,5 @@ def _stay(switch: str) -> None:
 
 if SWITCHES:
     sys.addaudithook(_heed)
+if "FAKETIME" in os.environ:  # libfaketime refuses how `time.sleep` asks
+    time.sleep = lambda seconds: select.select((), (), (), seconds)

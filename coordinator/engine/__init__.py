@@ -1,0 +1,1 @@
+"""A broker and workers: brought along, or found where they are."""

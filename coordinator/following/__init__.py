@@ -1,0 +1,1 @@
+"""Sending orders to the workers, and hearing what came of them."""
