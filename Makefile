@@ -11,7 +11,7 @@ demo: $(STAMP)  ## Render a small town, index it, locate old photos of it
 	$(BIN)/flaneur demo --out demo-out
 
 test: $(STAMP)  ## Run all tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 
 check: $(STAMP)  ## What CI runs: format, lint, types, import direction, tests
 	$(BIN)/ruff format --check .

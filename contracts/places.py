@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
     Place: TypeAlias = Path | UPath
 else:  # upath is imported where there is a URL: most runs have none. And typer knows no unions.
-    Place = object
+
+    class Place:
+        """A path or a URL."""
+
 
 _HERE = frozenset({"file", "local"})
 _NO_CREDENTIALS = frozenset({"NoCredentialsError", "PartialCredentialsError"})

@@ -24,7 +24,8 @@ Condition = Literal[
     "cancelled",
     "damaged",
 ]
-"""waiting : for the broker. pausing, ending : it was told to, and has not heeded it yet."""
+"""waiting : for the broker or a worker. pausing, ending : it was told to, and has not heeded it
+yet."""
 AT_WORK: tuple[Condition, ...] = ("at work", "waiting", "pausing", "paused", "ending")
 """A coordinator is there."""
 
@@ -159,7 +160,7 @@ def _condition(job: JobFolder, state: JobState, seen: Seen | None) -> Condition:
             return "ending"
         if wish == "pause":
             return "paused" if told == "paused" else "pausing"
-        return "waiting" if told == "waiting" else "at work"
+        return "waiting" if told in ("waiting", "alone") else "at work"
     if wish == "cancel" or told == "cancelled":
         return "cancelled"
     return "failed" if told == "failed" else "stopped"

@@ -15,7 +15,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from contracts.errors import BadIndex
 from contracts.places import Place
@@ -23,9 +22,6 @@ from contracts.progress import Progress
 from index.files import check_files, sync_folder, write_bytes
 from index.manifest import FileEntry, generation_path, read_generation
 from index.store import CURRENT, MODEL, Store, at_once, read_stored_generation
-
-if TYPE_CHECKING:
-    pass
 
 _PARTS = ".parts"
 

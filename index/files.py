@@ -15,6 +15,7 @@ import struct
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path, PurePosixPath
 from typing import IO, TypeVar
@@ -130,6 +131,18 @@ def read_text_file(path: Path, max_bytes: int = MAX_TEXT_BYTES) -> bytes:
         if size > max_bytes:
             raise OSError(errno.EFBIG, f"Larger than {max_bytes} bytes", str(path))
         return stream.read(size)  # and not max_bytes, for which memory would be set aside
+
+
+def is_shown(path: Path) -> bool:
+    """Whether a file is there, as the server of a shared folder knows it.
+
+    A client remembers for a minute which files are not there (NFS), unless the folder that they
+    would be in was opened since.
+    """
+    for folder in (path.parent.parent, path.parent):
+        with suppress(OSError):
+            os.close(os.open(folder, os.O_RDONLY | os.O_DIRECTORY))
+    return path.is_file()
 
 
 def sha256_of(path: Path) -> str:

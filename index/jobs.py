@@ -6,13 +6,11 @@ the files it names still have the digests it names.
 
 import hashlib
 import json
-import os
 import re
 import shutil
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -23,7 +21,7 @@ from contracts.config import IndexConfig
 from contracts.errors import BadIndex, TaskFailed
 from contracts.faults import first_fault
 from contracts.records import PosedImage, Receipt
-from index.files import is_inside, read_text_file, sha256_of, write_bytes
+from index.files import is_inside, is_shown, read_text_file, sha256_of, write_bytes
 from index.manifest import Name
 
 SCRATCH = ("features", "partials", "pieces", "ids")
@@ -267,18 +265,6 @@ class JobFolder:
         """Remove what only the job itself needed."""
         for name in SCRATCH:
             shutil.rmtree(self.path / name, ignore_errors=True)
-
-
-def is_shown(path: Path) -> bool:
-    """Whether a file is there, as the server of a shared folder knows it.
-
-    A client remembers for a minute which files are not there (NFS), unless the folder that they
-    would be in was opened since.
-    """
-    for folder in (path.parent.parent, path.parent):
-        with suppress(OSError):
-            os.close(os.open(folder, os.O_RDONLY | os.O_DIRECTORY))
-    return path.is_file()
 
 
 def jobs_of(root: Path) -> list[JobFolder]:

@@ -50,8 +50,9 @@ class Message(BaseModel):
             return cls.model_validate(content, context=roots)
         except ValidationError as error:
             where, what = first_fault(error)
+            told = f"{where}: {what}" if where else what
             raise TaskFailed(
-                f"A message for {cls.__name__} does not hold ({where}: {what}). "
+                f"A message for {cls.__name__} does not hold ({told}). "
                 "Are coordinator and workers of the same version?"
             ) from error
 

@@ -180,4 +180,4 @@ def _threads_each(n_tasks: int) -> int:
 
 def _brief(receipt: Receipt, *, anew: bool = True) -> Json:
     """What the coordinator needs to know. anew : it was not done already."""
-    return {"stage": receipt.stage, "key": receipt.key, "counts": receipt.counts, "anew": anew}
+    return {"counts": receipt.counts, "anew": anew}

@@ -32,7 +32,7 @@ def photos_at_hand(
     """
     with Fetcher() as fetcher:
         photos = read_sources(sources, fetcher)
-        elsewhere = [each for each in enumerate(photos) if each[1].urls]
+        elsewhere = [each for each in enumerate(photos) if each[1].is_elsewhere]
         if not elsewhere:
             yield photos
             return

@@ -94,10 +94,23 @@ class BatchFolder:
         return self._plan.exists()
 
     def write(self, plan: BatchPlan, photos: Sequence[Photo]) -> None:
-        """Put a batch there; its plan last."""
-        write_bytes(self.search_file(plan.search), plan.search.model_dump_json().encode())
-        write_photos(self._photos, photos)
-        write_bytes(self._plan, plan.model_dump_json(indent=1).encode())
+        """Put a batch there; its plan last.
+
+        Raises
+        ------
+        BadConfig : another process put one there meanwhile.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        with (self.path / ".submitting").open("a") as stream:
+            fcntl.flock(stream, fcntl.LOCK_EX)
+            if self.exists():
+                raise BadConfig(
+                    f"Another process submitted a batch {self.name} meanwhile. Run the same "
+                    "command again to go on with it, or give this one another name."
+                )
+            write_bytes(self.search_file(plan.search), plan.search.model_dump_json().encode())
+            write_photos(self._photos, photos)
+            write_bytes(self._plan, plan.model_dump_json(indent=1).encode())
 
     def read(self) -> BatchPlan:
         """The plan.
@@ -135,7 +148,7 @@ class BatchFolder:
         """
         with self._plan.open("rb+") as stream:
             gives_up_at = time.monotonic() + _PATIENCE_S
-            while not _locked(stream.fileno()):
+            while not _locked(stream.fileno(), fcntl.LOCK_EX):
                 if time.monotonic() > gives_up_at:
                     raise BadConfig(
                         f"Another process works on the batch {self.name} already; see "
@@ -145,9 +158,9 @@ class BatchFolder:
             yield
 
     def is_worked_on(self) -> bool:
-        """Whether a process is at work on it."""
-        with self._plan.open("rb+") as stream:
-            return not _locked(stream.fileno())
+        """Whether a process is at work on it; who may only read may ask too."""
+        with self._plan.open("rb") as stream:
+            return not _locked(stream.fileno(), fcntl.LOCK_SH)
 
     @property
     def _plan(self) -> Path:
@@ -164,9 +177,9 @@ def batches_in(place: Path) -> list[BatchFolder]:
     return [BatchFolder(place, name) for name in sorted(found) if _NAME.fullmatch(name)]
 
 
-def _locked(descriptor: int) -> bool:
+def _locked(descriptor: int, kind: int) -> bool:
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     return True

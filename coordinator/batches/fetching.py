@@ -1,16 +1,18 @@
 """Fetching from the web: bounded, patient with servers, a few at a time, each thing once."""
 
 import os
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from email.utils import parsedate_to_datetime
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import Self
+from typing import Any, Self
+from weakref import WeakSet
 
 import httpx
 
@@ -19,6 +21,8 @@ from contracts.errors import UnusableImage
 AT_ONCE = 2
 TRIES = 5
 _BUSY = frozenset({408, 425, 429, 500, 502, 503, 504})
+_CONNECTED = frozenset({"connection.connect_tcp.complete", "connection.start_tls.complete"})
+"""What httpcore tells when it has a socket."""
 _NOT_IMAGES = ("text/", "application/json", "application/ld+json", "application/xml")
 
 
@@ -55,10 +59,12 @@ class Fetcher:
     _client: httpx.Client = field(init=False)
     _turns: threading.Semaphore = field(init=False)
     _stopped: threading.Event = field(init=False)
+    _sockets: "WeakSet[socket.socket]" = field(init=False)
 
     def __post_init__(self) -> None:
         self._turns = threading.Semaphore(AT_ONCE)
         self._stopped = threading.Event()
+        self._sockets = WeakSet()
         self._client = httpx.Client(
             follow_redirects=True,
             max_redirects=5,
@@ -74,8 +80,11 @@ class Fetcher:
         self._client.close()
 
     def stop(self) -> None:
-        """Begin nothing more, and end what is begun."""
+        """Begin nothing more, and end what is begun, even where a server is silent."""
         self._stopped.set()
+        for each in list(self._sockets):
+            with suppress(OSError):  # closed meanwhile
+                each.shutdown(socket.SHUT_RDWR)
 
     def document(self, url: str) -> bytes:
         """What is at an address, such as a manifest.
@@ -143,6 +152,19 @@ class Fetcher:
                 raise Unfetched(f"{response.url} was not fetched: the work was stopped")
             yield piece
 
+    @contextmanager
+    def _asked(self, url: str, headers: dict[str, str]) -> Iterator[httpx.Response]:
+        if self._stopped.is_set():  # while it waited for its turn
+            raise Unfetched(f"{url} was not fetched: the work was stopped")
+
+        def trace(event: str, told: dict[str, Any]) -> None:
+            if event in _CONNECTED:
+                self._sockets.add(told["return_value"].get_extra_info("socket"))
+
+        asking = self._client.stream("GET", url, headers=headers, extensions={"trace": trace})
+        with asking as response:
+            yield response
+
     def _patiently(
         self, url: str, headers: dict[str, str], keep: Callable[[httpx.Response], None]
     ) -> None:
@@ -153,7 +175,7 @@ class Fetcher:
                 break
             pause_s = self.bounds.pause_s * 2 ** (attempt + 1)
             try:
-                with self._turns, self._client.stream("GET", url, headers=headers) as response:
+                with self._turns, self._asked(url, headers) as response:
                     if response.is_success:
                         keep(response)
                         return
@@ -165,7 +187,7 @@ class Fetcher:
                 reason = "it is redirected without end"
                 break
             except httpx.UnsupportedProtocol:
-                reason = "it is redirected to what is no http address"
+                reason = "it is, or leads to, what is no http address"
                 break
             except (httpx.InvalidURL, ValueError) as error:
                 reason = f"it is no address ({error})"

@@ -47,14 +47,16 @@ def kind_of(document: object) -> Literal["manifest", "collection"] | None:
 def canvases_of(manifest: Json) -> Iterator[Canvas]:
     """The canvases of a manifest, in its order: of version 3, or of the first sequence of 2."""
     if "sequences" in manifest:
-        sequences = _objects(manifest["sequences"])
-        for canvas in _objects(sequences[0].get("canvases")) if sequences else ():
-            bodies = [each.get("resource") for each in _objects(canvas.get("images"))]
+        sequences = objects(manifest["sequences"])
+        for canvas in objects(sequences[0].get("canvases")) if sequences else ():
+            bodies = [each.get("resource") for each in objects(canvas.get("images"))]
             yield _canvas(canvas, bodies)
         return
-    for canvas in _objects(manifest.get("items")):
-        notes = [note for page in _objects(canvas.get("items")) for note in _items(page)]
-        painted = [note for note in notes if note.get("motivation", "painting") == "painting"]
+    for canvas in objects(manifest.get("items")):
+        notes = [note for page in objects(canvas.get("items")) for note in _items(page)]
+        painted = [
+            note for note in notes if "painting" in _list(note.get("motivation", "painting"))
+        ]
         yield _canvas(canvas, [body for note in painted for body in _list(note.get("body"))])
 
 
@@ -62,7 +64,7 @@ def listed_in(collection: Json) -> Iterator[Json]:
     """What a collection lists, whole or by its id, and the page that comes next, if there is."""
     yield from _items(collection)
     for name in ("manifests", "collections", "members"):
-        yield from _objects(collection.get(name))
+        yield from objects(collection.get(name))
     following = collection.get("next", collection.get("first"))
     if isinstance(following, str):
         yield {"id": following, "type": "Collection"}
@@ -109,8 +111,8 @@ def _picture(body: object) -> Picture | None:
             source = body.get("source", body.get("full"))
             body = {"id": source, "type": "Image"} if isinstance(source, str) else source
         elif kind in {"Image", "dctypes:Image", "oa:Image"}:
-            services = [each for each in _objects(body.get("service")) if id_of(each)]
-            size = (_pixels(body.get("width")), _pixels(body.get("height")))
+            services = [each for each in objects(body.get("service")) if id_of(each)]
+            size = (pixels(body.get("width")), pixels(body.get("height")))
             return Picture(id_of(body), next(filter(_is_image_service, services), None), *size)
         else:
             return None
@@ -128,15 +130,17 @@ def _type(document: Json) -> str:
     return found if isinstance(found, str) else ""
 
 
-def _pixels(value: object) -> int:
+def pixels(value: object) -> int:
+    """A length in pixels; 0: it is none."""
     return value if isinstance(value, int) and not isinstance(value, bool) and value > 0 else 0
 
 
 def _items(document: Json) -> list[Json]:
-    return _objects(document.get("items", document.get("item")))
+    return objects(document.get("items", document.get("item")))
 
 
-def _objects(value: object) -> list[Json]:
+def objects(value: object) -> list[Json]:
+    """The objects of a list, or the one that stands for a list of one."""
     return [each for each in _list(value) if isinstance(each, dict)]
 
 

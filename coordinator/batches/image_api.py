@@ -6,7 +6,7 @@ https://iiif.io/api/image/
 import re
 from typing import Any
 
-from coordinator.batches.iiif import id_of
+from coordinator.batches.iiif import id_of, objects, pixels
 
 Json = dict[str, Any]
 
@@ -24,8 +24,8 @@ def image_url(service: Json, width_px: int, height_px: int, max_side_px: int) ->
     None : what is told is too little to ask; its info.json says more.
     """
     version, level = _version(service), _level(service)
-    width_px = _pixels(service.get("width")) or width_px
-    height_px = _pixels(service.get("height")) or height_px
+    width_px = pixels(service.get("width")) or width_px
+    height_px = pixels(service.get("height")) or height_px
     whole = "max" if version == 3 else "full"
     if width_px and height_px and max(width_px, height_px) <= max_side_px:
         return _request(service, version, whole)
@@ -50,10 +50,8 @@ def _listed_size(service: Json, version: int, max_side_px: int) -> str | None:
     """The smallest size offered that is not too small, or the largest offered."""
     sizes = [
         (width, height)
-        for each in service.get("sizes") or ()
-        if isinstance(each, dict)
-        and (width := _pixels(each.get("width")))
-        and (height := _pixels(each.get("height")))
+        for each in objects(service.get("sizes"))
+        if (width := pixels(each.get("width"))) and (height := pixels(each.get("height")))
     ]
     if not sizes:
         return None
@@ -84,7 +82,3 @@ def _level(service: Json) -> int:
 def _profile(service: Json) -> str:
     profile = service.get("profile", "")
     return str(profile[0] if isinstance(profile, list) and profile else profile)
-
-
-def _pixels(value: object) -> int:
-    return value if isinstance(value, int) and not isinstance(value, bool) and value > 0 else 0

@@ -30,7 +30,11 @@ class Journal:
 
     def __enter__(self) -> Self:
         self._file = self._path.open("ab", buffering=0)
-        self._file.write(b"\n")  # ends what a killed process may have begun
+        try:
+            self._write(b"\n")  # ends what a killed process may have begun
+        except OSError:
+            self._file.close()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -58,12 +62,18 @@ class Journal:
         self._add({"sha256": sha256})
 
     def _add(self, entry: dict[str, object]) -> None:
-        line = memoryview(json.dumps(entry, allow_nan=False).encode() + b"\n")
-        while line:  # a full disk may take a part
-            line = line[self._file.write(line) :]
+        self._write(json.dumps(entry, allow_nan=False).encode() + b"\n")
         if time.monotonic() - self._synced_at > SYNC_S:
             os.fsync(self._file.fileno())
             self._synced_at = time.monotonic()
+
+    def _write(self, line: bytes) -> None:
+        left = memoryview(line)
+        try:
+            while left:  # a full disk may take a part
+                left = left[self._file.write(left) :]
+        except OSError as error:  # which names no file
+            raise OSError(error.errno, error.strerror, str(self._path)) from error
 
 
 @dataclass(slots=True)

@@ -3,6 +3,7 @@
 import codecs
 import csv
 import io
+from contextlib import suppress
 from pathlib import Path
 
 from contracts.errors import WrongInput
@@ -25,8 +26,8 @@ _MARKS = (  # those of UTF-32 begin like those of UTF-16
 def read_list(path: Path) -> list[str]:
     """The paths of a list, as written.
 
-    UTF-8, UTF-16 or UTF-32 by its mark, else UTF-8, else Latin-1. With a header that names one of
-    `COLUMNS`, or without one a single column.
+    UTF-8, UTF-16 or UTF-32 by its mark, else UTF-8, else that of Windows, else Latin-1. With a
+    header that names one of `COLUMNS`, or without one a single column.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def _text(content: bytes) -> str:
     for mark, encoding in _MARKS:
         if content.startswith(mark):
             return content.decode(encoding)
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
+    for encoding in ("utf-8", "cp1252"):
+        with suppress(UnicodeDecodeError):
+            return content.decode(encoding)
+    return content.decode("latin-1")

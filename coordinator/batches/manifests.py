@@ -55,12 +55,17 @@ def fetched_photo(photo: Photo, fetcher: Fetcher, folder: Path) -> Path:
     ------
     Unfetched : it cannot be had.
     """
-    name = hashlib.sha256(json.dumps([photo.info, photo.urls]).encode()).hexdigest()[:32]
-    kept = folder / name
+    kept = kept_file(photo, folder)
     if not kept.exists():
         folder.mkdir(parents=True, exist_ok=True)
         fetcher.image(_addresses(photo, fetcher), kept)
     return kept
+
+
+def kept_file(photo: Photo, folder: Path) -> Path:
+    """Where a photo from elsewhere is kept, by its addresses."""
+    name = hashlib.sha256(json.dumps([photo.info, photo.urls]).encode()).hexdigest()[:32]
+    return folder / name
 
 
 def _addresses(photo: Photo, fetcher: Fetcher) -> Iterator[str]:
@@ -102,11 +107,10 @@ def _manifests(document: Json, name: str, fetcher: Fetcher) -> Iterator[Json | P
             yield found
             continue
         if not _is_whole(found) and found is not document:
-            url = urljoin(name, id_of(found))
             try:
-                found = _fetched(url, fetcher)
+                found = _fetched(_joined(name, id_of(found)), fetcher)
             except WrongInput as error:
-                yield Photo(url, error=str(error))
+                yield Photo(id_of(found) or name, error=str(error))
                 continue
             waiting.appendleft(found)
             continue
@@ -158,7 +162,17 @@ def _photo(canvas: Canvas, full_name: str, where: str) -> Photo:
         url = image_url(picture.service, picture.width_px, picture.height_px, MAX_SIDE_PX)
         info = None if url else info_url(picture.service)
     base = where if is_web_address(where) else ""
-    addresses = [urljoin(base, each) for each in (url, picture.url) if each]
-    if not all(map(is_web_address, filter(None, (*addresses, info)))) or not addresses:
+    addresses = [_joined(base, each) for each in (url, picture.url) if each]
+    urls = tuple(dict.fromkeys(filter(is_web_address, addresses)))
+    info = info if info and is_web_address(info) else ""
+    if not (urls or info):
         return Photo(query, error="its image has no address of http or https", full_name=full_name)
-    return Photo(query, urls=tuple(dict.fromkeys(addresses)), info=info or "", full_name=full_name)
+    return Photo(query, urls=urls, info=info, full_name=full_name)
+
+
+def _joined(base: str, reference: str) -> str:
+    """A reference as an address; one that cannot be joined as it is, for whoever fetches it."""
+    try:
+        return urljoin(base, reference)
+    except ValueError:
+        return reference

@@ -1,7 +1,7 @@
 """The photos of a batch: what each is called, and where its bytes come from."""
 
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -27,6 +27,11 @@ class Photo:
     error: str = ""
     full_name: str = ""
 
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether it is to be fetched."""
+        return bool(self.urls or self.info)
+
 
 def photo_file(name: str) -> Photo:
     """A photo by the name of its file, as it was given."""
@@ -36,8 +41,8 @@ def photo_file(name: str) -> Photo:
 def told_apart(photos: Iterable[Photo]) -> list[Photo]:
     """The photos in their order, each once, no two of one query: results go by it.
 
-    Canvases of several books are all called `1r`: those are called by their full names. The same
-    name twice, as where globs overlap, is the same photo.
+    Canvases of several books are all called `1r`: those are called by their full names, and by a
+    number where even these are the same. The same photo twice, as where globs overlap, is one.
     """
     listed = list(photos)
     named: dict[str, set[str]] = defaultdict(set)
@@ -49,9 +54,12 @@ def told_apart(photos: Iterable[Photo]) -> list[Photo]:
         else photo
         for photo in listed
     )
-    once: dict[str, Photo] = {}
-    for photo in distinct:
-        once.setdefault(photo.query, photo)
+    once = {(photo.query, photo.path, photo.urls, photo.info): photo for photo in distinct}
+    called = Counter[str]()
+    for same, photo in once.items():
+        called[photo.query] += 1
+        if (number := called[photo.query]) > 1:
+            once[same] = replace(photo, query=f"{photo.query} ({number})")
     return list(once.values())
 
 

@@ -11,6 +11,7 @@ from contracts.progress import Progress
 from coordinator.batches.batch import BatchFolder, BatchPlan
 from coordinator.batches.fetching import Fetcher
 from coordinator.batches.journal import Answers, Journal, is_error
+from coordinator.batches.manifests import kept_file
 from coordinator.batches.preparing import Preparing, Ready
 from coordinator.engine.running import Engine
 from coordinator.following.events import Order
@@ -151,8 +152,11 @@ def forget_failed(folder: BatchFolder) -> int:
     """
     with folder.worked_on():
         answers = Answers.read(folder.answers)
-        again = [*answers.errors]
-        again += [number for number, each in answers.digests.items() if each in answers.failed]
+        damaged = {number for number, each in answers.digests.items() if each in answers.failed}
+        again = [*answers.errors, *damaged]
+        for number, photo in enumerate(folder.photos()):
+            if number in damaged and photo.is_elsewhere:  # its server may have a better one by now
+                kept_file(photo, folder.fetched).unlink(missing_ok=True)
         with Journal(folder.answers) as journal:
             for sha256 in answers.failed:
                 journal.forget(sha256)

@@ -14,6 +14,7 @@ from survey.files import list_images
 
 STDIN = "-"
 MANIFESTS = (".json", ".jsonld")
+_READ_FROM = "photos are read from files and from addresses of http and https"
 
 
 def read_sources(sources: Sequence[str], fetcher: Fetcher) -> list[Photo]:
@@ -44,9 +45,7 @@ def _photos_of(source: str, fetcher: Fetcher) -> Iterable[Photo]:
     if is_web_address(source):
         return photos_at(source, fetcher)
     if "://" in source:
-        raise WrongInput(
-            f"{source}: photos are read from files and from addresses of http and https."
-        )
+        raise WrongInput(f"{source}: {_READ_FROM}.")
     path = Path(source)
     if path.is_dir():
         return _in_folder(path)
@@ -75,4 +74,9 @@ def _in_folder(folder: Path) -> list[Photo]:
 def _listed(names: Iterable[str], folder: Path) -> Iterator[Photo]:
     """Photos of a list, relative to its folder; an address is fetched."""
     for name in names:
-        yield Photo(name, urls=(name,)) if is_web_address(name) else photo_file(str(folder / name))
+        if is_web_address(name):
+            yield Photo(name, urls=(name,))
+        elif "://" in name:
+            yield Photo(name, error=_READ_FROM)
+        else:
+            yield photo_file(str(folder / name))

@@ -44,7 +44,7 @@ def submit(
 
     Raises
     ------
-    BadConfig : the search means no image.
+    BadConfig : the search means no image, or another process submitted such a batch meanwhile.
     """
     plan = BatchPlan(
         name=folder.name,
@@ -62,15 +62,23 @@ def submit(
 
 
 def refuse_another(
-    folder: BatchFolder, plan: BatchPlan, search: SearchConfig, sources: Sequence[str]
+    folder: BatchFolder,
+    plan: BatchPlan,
+    search: SearchConfig,
+    priority: int,
+    sources: Sequence[str],
 ) -> None:
     """The same command again goes on with a batch; another one does not change it.
 
     Raises
     ------
-    BadConfig : the batch has other sources or another search.
+    BadConfig : the batch has other sources, another search or another priority.
     """
-    asked = (("sources", lasting(sources), plan.sources), ("options", search, plan.search))
+    asked = (
+        ("sources", lasting(sources), plan.sources),
+        ("options", search, plan.search),
+        ("priority", priority, plan.priority),
+    )
     for what, now, before in asked:
         if now != before:
             raise BadConfig(

@@ -22,6 +22,12 @@ from index.control import Wish, read_wish
 EVERY_S = 2.0
 HEARD_S = 120.0
 """A worker that no answer came from for so long is not counted as at work."""
+_STATES: dict[str, State] = {
+    "waiting": "waiting",
+    "back": "at work",
+    "alone": "alone",
+    "joined": "at work",
+}
 
 
 class Watch:
@@ -35,6 +41,7 @@ class Watch:
         self._pace = Pace()
         self._heard: dict[str, float] = {}
         self._told = ""
+        self._state: State = "at work"
         self._begun_at = utc_now()
         self._written_at = 0.0
 
@@ -44,20 +51,21 @@ class Watch:
             self._pace.add(done - self._known_done)
         self._known_done = self._done = done
         self._failed = failed
-        self._tell("at work")
+        self._tell(self._state)
 
     def hear(self, event: Event) -> None:
         """What the follower tells of its orders."""
         self._lost += event.kind == "lost"
         self._refused += event.kind == "refused"
         self._told = event.told or self._told
+        self._state = _STATES.get(event.kind, self._state)
         if event.worker:
             self._heard[event.worker] = time.monotonic()
 
     def wish(self) -> Wish:
         """What is wished of the batch; asked about once a second."""
         wish = read_wish(self._folder.path)
-        self._tell("paused" if wish == "pause" else "at work")
+        self._tell("paused" if wish == "pause" else self._state)
         return wish
 
     def end(self, state: State, told: str = "") -> None:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:  # geopandas and faiss are imported when the verb runs
 NAME = "add"
 
 
-@reads_a_survey
+@reads_a_survey()
 def command(
     survey: SurveyPath,
     index: OwnIndex,

@@ -1,8 +1,10 @@
 """`flaneur batch`: photos by the thousand, under a name, through kills, reboots and pauses."""
 
+import shlex
 import subprocess
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -102,7 +104,8 @@ def submit(
     search = search.model_copy(update={"where": where})
     if folder.exists():
         plan = folder.read()
-        refuse_another(folder, plan, search, sources)
+        refuse_another(folder, plan, search, priority, sources)
+        tell(f"It was submitted {plan.made_at}: photos that came since are not in it")
     else:
         with Fetcher() as fetcher:
             photos = read_sources(sources, fetcher)
@@ -139,7 +142,7 @@ def pause(name: Name, index: IndexFolder, batches: Batches = None) -> None:
     folder = batch_folder(name, index, batches)
     folder.read()
     write_wish(folder.path, "pause")
-    tell(f"Batch {name} is paused. Go on with: flaneur batch resume {name} --index {index}")
+    tell(f"Batch {name} is paused. Go on with: flaneur batch resume {_named(folder, index)}")
 
 
 def cancel(name: Name, index: IndexFolder, batches: Batches = None) -> None:
@@ -151,7 +154,7 @@ def cancel(name: Name, index: IndexFolder, batches: Batches = None) -> None:
     write_wish(folder.path, "cancel")
     tell(
         f"Batch {name} is cancelled; its answers stay. Go on after all with: "
-        f"flaneur batch resume {name} --index {index}"
+        f"flaneur batch resume {_named(folder, index)}"
     )
 
 
@@ -160,23 +163,37 @@ def _go_on(
 ) -> int:
     from coordinator.batches.following import follow_apart, follow_batch
     from coordinator.batches.states import state_of_batch
-    from index.control import write_wish
+    from index.control import begin_again
 
-    write_wish(folder.path, "run")
+    begin_again(folder.path)
     if folder.is_worked_on():
-        tell(f"A process works on it: flaneur batch status {folder.name} --index {index} --watch")
+        tell(f"A process works on it: flaneur batch status {_named(folder, index)} --watch")
         return 0
     if wait:
-        with bars() as progress:
-            follow_batch(folder, from_anywhere(index), broker, workers, progress)
-        return _end(state_of_batch(folder), index)
+        try:
+            with bars() as progress:
+                follow_batch(folder, from_anywhere(index), broker, workers, progress)
+        except KeyboardInterrupt:
+            tell(f"Its answers are kept. Go on with: flaneur batch resume {_named(folder, index)}")
+            raise
+        return _end(state_of_batch(folder), _named(folder, index))
     process = follow_apart(folder, from_anywhere(index), broker, workers)
     _until_begun(folder, process)
     tell(
-        f"It goes on by itself: flaneur batch status {folder.name} --index {index} --watch; "
+        f"It goes on by itself: flaneur batch status {_named(folder, index)} --watch; "
         f"its log: {folder.log}"
     )
     return 0
+
+
+def _named(folder: "BatchFolder", index: Place) -> str:
+    """A batch as the arguments of a command that can be pasted."""
+    from coordinator.batches.batch import BATCHES
+
+    words = [folder.name, "--index", str(index)]
+    if not isinstance(index, Path) or folder.place != index.absolute() / BATCHES:
+        words += ["--batches", str(folder.place)]
+    return shlex.join(words)
 
 
 def _until_begun(folder: "BatchFolder", process: "subprocess.Popen[bytes]") -> None:
@@ -197,10 +214,10 @@ def _until_begun(folder: "BatchFolder", process: "subprocess.Popen[bytes]") -> N
         raise TaskFailed(f"The batch {folder.name} could not be begun: {said}")
 
 
-def _end(state: "BatchState", index: Place) -> int:
+def _end(state: "BatchState", named: str) -> int:
     tell(
         f"{state.done - state.failed} of {state.photos} photos located, {state.failed} could not "
-        f"be. Write the answers with: flaneur batch results {state.name} --index {index} "
+        f"be. Write the answers with: flaneur batch results {named} "
         "--out FILE.geojson"
     )
     return SOME_SKIPPED if state.failed else 0

@@ -11,20 +11,10 @@ from contracts.errors import BadConfig
 from coordinator.cli.lists import SOME_SKIPPED
 from coordinator.cli.outputs import refuse_inside, result_file, result_folder, utf_8
 from coordinator.cli.show import stdout, tell
-from coordinator.cli.survey_options import (
-    AllowBallpark,
-    Crs,
-    Exclude,
-    Format,
-    Include,
-    Mapping,
-    MaxGap,
-    NoPose,
-    North,
-    SurveyPath,
-)
+from coordinator.cli.survey_options import SurveyPath, reads_a_survey
 
 if TYPE_CHECKING:  # survey is imported when the verb runs
+    from survey import ReadOptions
     from survey.doctor import Examination
 
 NAME = "doctor"
@@ -32,20 +22,10 @@ ERRORS = 2
 """Exit code: `flaneur index` would refuse the survey or place photos wrongly."""
 
 
+@reads_a_survey(without=("whole_panoramas", "no_track_headings", "stored_rotation"))
 def command(
     survey: SurveyPath,
-    include: Include = None,
-    exclude: Exclude = None,
-    crs: Crs = None,
-    north: North = None,
-    no_pose: NoPose = False,
-    survey_format: Format = None,
-    mapping: Mapping = None,
-    max_gap: MaxGap = 1.0,
-    allow_ballpark: AllowBallpark = False,
-    no_masks: Annotated[
-        bool, typer.Option("--no-masks", help="Ignore the survey's masks.")
-    ] = False,
+    reading: "ReadOptions",
     out: Annotated[
         Path | None, typer.Option(help="A folder for report.json, report.txt and track.png.")
     ] = None,
@@ -59,7 +39,6 @@ def command(
     Exit code 0: nothing worse than a note; 3: warnings; 2: errors.
     """
     from coordinator.export.examination import as_dict, as_text, write_picture, write_report
-    from survey import ReadOptions
     from survey.doctor import examine
 
     folder = None if out is None else result_folder(out)
@@ -67,19 +46,7 @@ def command(
     for option, place in (("--out", out), ("--picture", picture)):
         if place is not None:
             refuse_inside(survey, place, option)
-    options = ReadOptions(
-        crs=crs,
-        north=north,
-        no_pose=no_pose,
-        include=tuple(include or ()),
-        exclude=tuple(exclude or ()),
-        format=survey_format,
-        use_masks=not no_masks,
-        mapping=mapping,
-        max_gap_s=max_gap,
-        allow_ballpark=allow_ballpark,
-    )
-    examination = examine(survey.absolute(), options, datetime.now(UTC))
+    examination = examine(survey.absolute(), reading, datetime.now(UTC))
     if folder is not None:
         write_report(folder, examination)
         tell(f"Report: {out}")

@@ -2,8 +2,9 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,62 +12,34 @@ from coordinator.cli.lists import SOME_SKIPPED, SeenIndex
 from coordinator.cli.opening import opened_index
 from coordinator.cli.outputs import result_file, utf_8
 from coordinator.cli.show import bars, list_skipped, tell
-from coordinator.cli.survey_options import (
-    AllowBallpark,
-    Crs,
-    Exclude,
-    Format,
-    Include,
-    Mapping,
-    MaxGap,
-    NoPose,
-    North,
-    SurveyPath,
-)
+from coordinator.cli.survey_options import SurveyPath, reads_a_survey
+
+if TYPE_CHECKING:  # reading a survey imports much
+    from survey import ReadOptions
 
 NAME = "export"
 HELP = "Write a survey, an index or results in the formats of other software."
 
 
+@reads_a_survey(without=("whole_panoramas", "no_track_headings", "stored_rotation", "no_masks"))
 def mcap(
     survey: SurveyPath,
     out: Annotated[Path, typer.Argument(metavar="OUT.mcap", help="The MCAP file.")],
-    include: Include = None,
-    exclude: Exclude = None,
-    crs: Crs = None,
-    north: North = None,
-    no_pose: NoPose = False,
-    survey_format: Format = None,
-    mapping: Mapping = None,
-    max_gap: MaxGap = 1.0,
-    allow_ballpark: AllowBallpark = False,
+    reading: "ReadOptions",
 ) -> int:
     """A survey as one MCAP file: images, places and attitudes, for Foxglove and ROS 2."""
     from coordinator.export.mcap import write_mcap
-    from survey import ReadOptions, read_survey
+    from survey import read_survey
 
-    options = ReadOptions(
-        crs=crs,
-        north=north,
-        no_pose=no_pose,
-        include=tuple(include or ()),
-        exclude=tuple(exclude or ()),
-        format=survey_format,
-        mapping=mapping,
-        max_gap_s=max_gap,
-        # What the survey itself says, nothing made of it: whole panoramas, measured headings.
-        cut_panoramas=False,
-        derive_headings=False,
-        use_masks=False,  # MCAP has no place for them
-        allow_ballpark=allow_ballpark,
-    )
+    # What the survey itself says, nothing made of it; and MCAP has no place for masks.
+    options = replace(reading, cut_panoramas=False, derive_headings=False, use_masks=False)
     out = result_file(out, (survey,))
     found = read_survey(survey.absolute(), options)
     for note in found.notes:
         tell(note)
     with bars() as progress:
         progress.begin("mcap", len(found.images), 0)
-        written = write_mcap(found, out, lambda: progress.advance("mcap"), allow_ballpark)
+        written = write_mcap(found, out, lambda: progress.advance("mcap"), options.allow_ballpark)
     skipped = (*found.skipped, *written.skipped)
     list_skipped(skipped, "the survey")
     tell(f"{written.n_images} of {len(found.images) + len(found.skipped)} images: {out}")

@@ -16,7 +16,6 @@ from contracts.config import (
     IndexConfig,
 )
 from contracts.errors import BadConfig
-from contracts.places import Place, place_of
 from coordinator.cli.announcing import (
     HERE,
     MetricsAddress,
@@ -36,9 +35,10 @@ from coordinator.cli.lists import (
     names_among,
 )
 from coordinator.cli.show import complain, list_skipped, tell
-from coordinator.cli.survey_options import Also, ShardSize, SurveyPath, reads_a_survey, survey_name
+from coordinator.cli.survey_options import Also, ShardSize, SurveyPath, named_survey, reads_a_survey
 
 if TYPE_CHECKING:  # reading a survey imports much
+    from coordinator.indexing import IndexReport
     from survey import ReadOptions
 
 NAME = "index"
@@ -57,7 +57,7 @@ MaxWords = Annotated[
 ]
 
 
-@reads_a_survey
+@reads_a_survey()
 def command(
     survey: SurveyPath,
     index: OwnIndex,
@@ -97,7 +97,7 @@ def command(
     root = index.absolute()
     if codebooks is None:
         source = words = None
-        config = _trained(detectors, descriptors, max_frames, max_words, seed)
+        config = training_config(detectors, descriptors, max_frames, max_words, seed)
     else:
         _refuse_training(max_words, seed)
         source = open_words(codebooks.absolute())
@@ -124,29 +124,17 @@ def command(
             broker, workers, JOB_QUEUES, priority=priority, listen=watchers.listen
         )
         report = run_job(job, plan, intake, engine, watchers.progress)
-    generation = report.generation
     for warning in report.warnings:
         complain(warning)
     if source is not None:
-        here = generation.segments[0].quantisation
+        here = report.generation.segments[0].quantisation
         warning = misfit(source.words.quantisation, here, "without --codebooks words are trained")
         if warning:
             complain(warning)
     list_skipped(report.skipped, str(job.path / "skipped.json"))
     if report.images_extracted:
         tell_what_it_did(job)
-    seconds = time.perf_counter() - started
-    summary = {
-        "generation": generation.number,
-        "images": generation.n_live,
-        "extracted_now": report.images_extracted,
-        "skipped": [{"uri": each.uri, "reason": each.reason} for each in report.skipped],
-        "without_keypoints": report.without_frames,
-        "postings": generation.n_postings,
-        "bytes": report.bytes_on_disk,
-        "seconds": round(seconds, 3),
-        "images_per_second": round(report.images_extracted / seconds, 3),
-    }
+    summary = _summary(report, time.perf_counter() - started)
     if as_json:
         typer.echo(json.dumps(summary, ensure_ascii=False).encode())  # UTF-8 in every locale
     else:
@@ -154,13 +142,19 @@ def command(
     return SOME_SKIPPED if report.skipped else 0
 
 
-def _trained(
-    detectors: str | None,
-    descriptors: str | None,
-    max_frames: str | None,
-    max_words: int | None,
-    seed: int | None,
+def training_config(
+    detectors: str | None = None,
+    descriptors: str | None = None,
+    max_frames: str | None = None,
+    max_words: int | None = None,
+    seed: int | None = None,
 ) -> IndexConfig:
+    """What an index with words of its own is made by; None: its default.
+
+    Raises
+    ------
+    BadConfig : an option does not hold; names it.
+    """
     limits = {"max_words": max_words, "seed": seed}
     return IndexConfig(
         features=FeatureConfig.of(
@@ -188,18 +182,19 @@ def _or_all(text: str | None, known: Sequence[str]) -> str:
     return ",".join(known) if text is None else text
 
 
-def named_survey(text: str) -> tuple[str, Place]:
-    """Read `NAME=SURVEY` of --also.
-
-    Raises
-    ------
-    BadConfig : it is something else.
-    """
-    name, separator, path = text.partition("=")
-    refused = f"--also takes NAME=SURVEY, with no / in NAME; got {text!r}"
-    if not (separator and name and path):
-        raise BadConfig(refused)
-    return survey_name(name, refused), place_of(path).absolute()
+def _summary(report: "IndexReport", seconds: float) -> dict[str, object]:
+    generation = report.generation
+    return {
+        "generation": generation.number,
+        "images": generation.n_live,
+        "extracted_now": report.images_extracted,
+        "skipped": [{"uri": each.uri, "reason": each.reason} for each in report.skipped],
+        "without_keypoints": report.without_frames,
+        "postings": generation.n_postings,
+        "bytes": report.bytes_on_disk,
+        "seconds": round(seconds, 3),
+        "images_per_second": round(report.images_extracted / seconds, 3),
+    }
 
 
 def _sentence(summary: dict[str, object], root: Path) -> str:

@@ -38,8 +38,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="As JSON on stdout.")]
 def list_(index: OwnIndex, as_json: AsJson = False) -> None:
     """All jobs of an index, the one begun last at the end, and how each is.
 
-    at work, waiting (for the broker), pausing, paused, ending: a coordinator is there. stopped,
-    failed, cancelled: none is, and running the same command again goes on.
+    at work, waiting (for the broker or a worker), pausing, paused, ending: a coordinator is there.
+    stopped, failed, cancelled: none is, and running the same command again goes on.
     """
     from coordinator.known_jobs import known_jobs
 

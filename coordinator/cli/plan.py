@@ -6,19 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from contracts.config import (
-    DESCRIPTORS,
-    DETECTORS,
-    CodebookConfig,
-    FeatureConfig,
-    IndexConfig,
-)
+from contracts.config import DESCRIPTORS, DETECTORS
 from contracts.places import Place
-from coordinator.cli.index import named_survey
-from coordinator.cli.lists import SOME_SKIPPED, MaxFrames, frame_limits, names_among
+from coordinator.cli.index import MaxWords, training_config
+from coordinator.cli.lists import SOME_SKIPPED, MaxFrames
 from coordinator.cli.outputs import utf_8
 from coordinator.cli.show import bars, list_skipped, tell
-from coordinator.cli.survey_options import Also, ShardSize, SurveyPath, reads_a_survey
+from coordinator.cli.survey_options import Also, ShardSize, SurveyPath, named_survey, reads_a_survey
 from coordinator.cli.tables import print_line, print_table
 
 if TYPE_CHECKING:  # reading a survey imports much
@@ -28,7 +22,7 @@ NAME = "plan"
 WORKERS = (1, 2, 8, 40)
 
 
-@reads_a_survey
+@reads_a_survey()
 def command(
     survey: SurveyPath,
     reading: "ReadOptions",
@@ -36,7 +30,7 @@ def command(
     detectors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DETECTORS),
     descriptors: Annotated[str, typer.Option(help="Which to run.")] = ",".join(DESCRIPTORS),
     max_frames: MaxFrames = None,
-    max_words: Annotated[int, typer.Option(help="Largest codebook.")] = 20_000,
+    max_words: MaxWords = None,
     shard_size: ShardSize = None,
     sample: Annotated[int, typer.Option(min=1, max=10_000, help="Images to extract for it.")] = 20,
     workers: Annotated[
@@ -58,14 +52,7 @@ def command(
     from coordinator.intake import read_surveys
     from coordinator.plan import shard_size_for
 
-    config = IndexConfig(
-        features=FeatureConfig.of(
-            detectors=names_among(detectors, DETECTORS, "--detectors"),
-            descriptors=names_among(descriptors, DESCRIPTORS, "--descriptors"),
-            **frame_limits(max_frames or ""),
-        ),
-        codebooks=CodebookConfig.of(max_words=max_words),
-    )
+    config = training_config(detectors, descriptors, max_frames, max_words)
     sources: list[tuple[str, Place]] = [("", survey.absolute()), *map(named_survey, also or ())]
     machine = Machine(idle=idle_as_a_worker(), slowness=slowness())
     intake = read_surveys(sources, reading)

@@ -1,7 +1,7 @@
 """How a survey is to be read: the options that verbs share."""
 
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import wraps
 from inspect import Signature, signature
 from pathlib import Path
@@ -11,11 +11,13 @@ import typer
 
 from contracts.config import North as NorthName
 from contracts.errors import BadConfig
-from contracts.places import Place
+from contracts.places import Place, place_of
 from coordinator.cli.lists import given_place
 
 if TYPE_CHECKING:  # reading a survey imports much
     from survey import ReadOptions
+
+Verb = Callable[..., int]
 
 SurveyPath = Annotated[
     Place,
@@ -122,26 +124,49 @@ def reading_options(
     )
 
 
-def reads_a_survey(command: Callable[..., int]) -> Callable[..., int]:
+def reads_a_survey(without: Collection[str] = ()) -> Callable[[Verb], Verb]:
     """Give a verb the options of `reading_options` in the place of its parameter `reading`.
 
     typer knows a verb's options by the signature of its function, and has no groups of them.
+    without : parameters of `reading_options` that are none of this verb's business.
     """
-    own, shared = signature(command).parameters, signature(reading_options).parameters
-    parameters = [
+    shared = [
         option
-        for name, parameter in own.items()
-        for option in (shared.values() if name == "reading" else (parameter,))
+        for name, option in signature(reading_options).parameters.items()
+        if name not in without
     ]
 
-    @wraps(command)
-    def run(**given: object) -> int:
-        asked: dict[str, Any] = {name: given.pop(name) for name in shared}
-        return command(**given, reading=reading_options(**asked))
+    def with_options(command: Verb) -> Verb:
+        parameters = [
+            option
+            for name, own in signature(command).parameters.items()
+            for option in (shared if name == "reading" else [own])
+        ]
 
-    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {each.name: each.annotation for each in parameters}
-    return run
+        @wraps(command)
+        def run(**given: object) -> int:
+            asked: dict[str, Any] = {each.name: given.pop(each.name) for each in shared}
+            return command(**given, reading=reading_options(**asked))
+
+        run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        return run
+
+    return with_options
+
+
+def named_survey(text: str) -> tuple[str, Place]:
+    """Read `NAME=SURVEY` of --also.
+
+    Raises
+    ------
+    BadConfig : it is something else.
+    """
+    name, separator, path = text.partition("=")
+    refused = f"--also takes NAME=SURVEY, with no / in NAME; got {text!r}"
+    if not (separator and name and path):
+        raise BadConfig(refused)
+    return survey_name(name, refused), place_of(path).absolute()
 
 
 def survey_name(name: str, refused: str) -> str:

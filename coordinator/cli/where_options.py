@@ -3,13 +3,15 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from contracts.config import Where
 from contracts.errors import BadConfig
-from index.manifest import Generation
+
+if TYPE_CHECKING:  # pydantic models are made when a verb runs
+    from index.manifest import Generation
 
 Bbox = Annotated[
     str | None,
@@ -47,7 +49,7 @@ Uri = Annotated[
 
 
 def where_of(
-    generation: Generation,
+    generation: "Generation",
     bbox: str | None = None,
     within: Path | None = None,
     since: str | None = None,
@@ -96,7 +98,7 @@ def _heading(text: str) -> tuple[float, float]:
     return middle, reach
 
 
-def _surveys(generation: Generation, asked: Sequence[str]) -> tuple[str, ...]:
+def _surveys(generation: "Generation", asked: Sequence[str]) -> tuple[str, ...]:
     """The names as the catalogue has them; `main` is the one without, unless one is called so."""
     from index.selecting import MAIN
 

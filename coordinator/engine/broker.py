@@ -1,6 +1,7 @@
 """The broker a person named: whether it answers, if not why not, and who works there."""
 
 import os
+import re
 import socket
 import ssl
 import time
@@ -37,6 +38,7 @@ def check_broker(url: str) -> Redis:
         a replica, a full one.
     """
     try:
+        _refuse_odd_database(url)
         server = connect(url, ANSWER_S)
         server.set(PROBE_KEY, "", px=1000)  # a replica and a full server answer, but take nothing
     except (RedisError, ValueError, TypeError, OSError) as error:
@@ -45,6 +47,13 @@ def check_broker(url: str) -> Redis:
             f"(--broker or {BROKER_VARIABLE}; without both, Flaneur starts a server of its own.)"
         ) from error
     return server
+
+
+def _refuse_odd_database(url: str) -> None:
+    """redis-py takes database 0 where an address ends in anything but a number."""
+    address = urlsplit(url)
+    if address.scheme in ("redis", "rediss") and not re.fullmatch(r"/?[0-9]*", address.path):
+        raise ValueError
 
 
 def _reason(url: str, error: Exception) -> str:

@@ -12,12 +12,13 @@ import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from celery import Celery
 
 from coordinator.engine.broker import broker_url, check_broker, check_workers
-from coordinator.engine.embedded import embedded_server
+from coordinator.engine.embedded import embedded_server, watch_embedded
 from coordinator.engine.exposure import exposure
 from coordinator.engine.local_workers import LocalWorkers
 from coordinator.following.events import Listener, unheard
@@ -74,8 +75,8 @@ def running_engine(
             url = stack.enter_context(embedded_server(folder))
             app = make_app(url)
             count = n_workers or available_cores()
-            local = LocalWorkers(url, queues, count, folder / "worker.log")
-            watch = stack.enter_context(local).watch
+            local = stack.enter_context(LocalWorkers(url, queues, count, folder / "worker.log"))
+            watch = partial(_watch_ours, url, local)
         follower = Follower(
             app,
             uuid.uuid4().hex[:12],
@@ -91,6 +92,11 @@ def running_engine(
 def available_cores() -> int:
     """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _watch_ours(url: str, workers: LocalWorkers) -> None:
+    watch_embedded(url)
+    workers.watch()
 
 
 def _nothing() -> None:

@@ -48,7 +48,7 @@ class Courier(Protocol):
     """
 
     def room(self) -> int:
-        """How many orders may be in flight."""
+        """How many orders the workers that listen have room for; 0: none listens."""
 
     def send(self, orders: Mapping[str, Order]) -> None:
         """Put orders into their queues. orders : by the ids of their tasks."""

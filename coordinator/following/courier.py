@@ -36,27 +36,22 @@ AT_ONCE = 1000
 
 
 class RedisCourier:
-    """Carries the orders of one flow. in_flight : while no worker tells of itself."""
+    """Carries the orders of one flow."""
 
-    def __init__(
-        self, app: Celery, flow: str, lease_s: float, priority: int, in_flight: int
-    ) -> None:
+    def __init__(self, app: Celery, flow: str, lease_s: float, priority: int) -> None:
         self._app = app
         self._server: Redis = app.backend.client
         self._flow = flow
         self._lease_s = lease_s
         self._priority = priority
-        self._in_flight = in_flight
         self._roots = roots_here()
         self._queues: set[str] = set()
         """That anything was sent to."""
 
     def room(self) -> int:
         with _told_if_away():
-            processes = processes_on(
-                listening(self._server), sorted(self._queues) or QUEUES, our_version()
-            )
-        return max(EACH_PROCESS * processes or self._in_flight, EACH_PROCESS)
+            present = listening(self._server)
+        return EACH_PROCESS * processes_on(present, sorted(self._queues) or QUEUES, our_version())
 
     def send(self, orders: Mapping[str, Order]) -> None:
         with (

@@ -15,9 +15,12 @@ Kind = Literal[
     "resumed",
     "waiting",
     "back",
+    "alone",
+    "joined",
 ]
 """lost : its worker was not heard of for too long, so it was sent again. given_up : it was begun
-too often. waiting : the broker is away; back : it is not."""
+too often. waiting : the broker is away; back : it is not. alone : no worker listens;
+joined : one does again."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,9 +47,13 @@ class Terms:
     """How patient to be.
 
     lease_s : with a worker that is not heard of. outage_s : with a broker that is away.
-    refusals : how often an order may be refused.
+    alone_s : without any worker, before that is told: one that starts needs a moment.
+    in_flight : orders, until a worker tells of itself. refusals : how often an order may be
+    refused.
     """
 
+    in_flight: int = 4
+    alone_s: float = 20.0
     lease_s: float = 60.0
     outage_s: float = 600.0
     refusals: int = 10
@@ -90,6 +94,9 @@ class Flow:
     _n_sent: int = 0
     _room: int = 0
     _paused: bool = False
+    _alone: bool = False
+    _joined_at: float = 0.0
+    """When a worker was last seen to listen."""
     _refusing: set[str] = field(default_factory=set)
     _furthest: dict[str, int] = field(default_factory=dict)
     """By kind of order, the last sent one that has landed: a queue is first in, first out."""
@@ -109,9 +116,11 @@ class Flow:
         """
         waiting = iter(orders)
         more = True
-        self._check_at = time.monotonic() + self._check_every_s
+        self._joined_at = time.monotonic()
+        self._check_at = self._joined_at + self._check_every_s
+        self._room = self.terms.in_flight
         try:
-            self._room = self._patiently(self.courier.room)
+            self._look_around()
             while True:
                 self._heed()
                 looking = more and not self._paused
@@ -187,7 +196,7 @@ class Flow:
 
     def _check(self) -> Sequence[Landing]:
         """Look at all that is in flight: what landed unheard, and what is lost."""
-        self._room = self._patiently(self.courier.room)
+        self._look_around()
         orders = {task_id: flight.order for task_id, flight in self._flying.items()}
         landings, seen = self._patiently(lambda: self.courier.look(orders))
         lost: dict[str, _Flight] = {}
@@ -201,6 +210,17 @@ class Flow:
         self._overtaken = dict(self._furthest)
         self._check_at = time.monotonic() + self._check_every_s
         return landings
+
+    def _look_around(self) -> None:
+        """Make room for the workers that listen; what is sent waits while none does."""
+        room = self._patiently(self.courier.room)
+        now = time.monotonic()
+        if room:
+            self._room, self._joined_at = room, now
+        alone = now - self._joined_at > self.terms.alone_s
+        if alone != self._alone and not self._paused:
+            self._alone = alone
+            self.ears.listen(Event("alone" if alone else "joined"))
 
     def _is_lost(self, flight: _Flight, seen: Sighting) -> bool:
         """Begun and held no longer; or never begun, and not in the queue any more."""
@@ -269,5 +289,6 @@ class Flow:
                 if away_since is not None:
                     self.ears.listen(Event("back"))
                     # Workers need a moment to tell that they still hold what they hold.
-                    self._check_at = time.monotonic() + 2 * self._check_every_s
+                    self._joined_at = time.monotonic()
+                    self._check_at = self._joined_at + 2 * self._check_every_s
                 return result

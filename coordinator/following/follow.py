@@ -28,7 +28,7 @@ def go_on() -> Wish:
 class Follower:
     """Sends orders to the workers and yields what comes back, in the order of completion.
 
-    run_id : of its own, for it begins the ids of tasks. in_flight : how many orders, while no
+    run_id : of its own, for it begins the ids of tasks. in_flight : how many orders, until a
     worker tells of itself. watch : called at least once a second; raises if all is for nothing.
     priority : of all that it sends, 0 before 9. wish : asked about once a second.
     """
@@ -61,8 +61,9 @@ class Follower:
         ------
         Cancelled : that was wished. BrokerUnreachable : it was away for too long.
         """
-        name, terms = f"{self.run_id}-{next(self._numbers)}", Terms(lease_s=lease_s())
-        courier = RedisCourier(self.app, name, terms.lease_s, self.priority, self.in_flight)
+        name = f"{self.run_id}-{next(self._numbers)}"
+        terms = Terms(in_flight=self.in_flight, lease_s=lease_s())
+        courier = RedisCourier(self.app, name, terms.lease_s, self.priority)
         return Flow(courier, name, terms, Ears(self.wish, self.listen, self.watch)).outcomes(orders)
 
     def results(self, orders: Iterable[Order | None]) -> Iterator[tuple[Order, dict[str, Any]]]:

@@ -49,6 +49,8 @@ def _state(seen: Seen) -> str:
         return f"stopped without a word (process {at.pid} on {at.host}; last heard {at.updated_at})"
     if at.state == "waiting":
         return f"waits for the broker ({at.told})" if at.told else "waits for the broker"
+    if at.state == "alone":
+        return "waits for a worker: none listens"
     quiet = seen.is_at_work and seen.quiet_s > QUIET_S
     return f"{at.state}, silent for {duration(seen.quiet_s)}" if quiet else at.state
 

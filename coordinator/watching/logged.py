@@ -5,30 +5,25 @@ import logging
 from coordinator.following.events import Event, Kind
 from workers.logs import about, logger
 
-_LEVELS: dict[Kind, int] = {
-    "sent": logging.DEBUG,
-    "done": logging.INFO,
-    "failed": logging.ERROR,
-    "lost": logging.WARNING,
-    "refused": logging.WARNING,
-    "given_up": logging.ERROR,
-    "paused": logging.WARNING,
-    "resumed": logging.WARNING,
-    "waiting": logging.WARNING,
-    "back": logging.WARNING,
-}
-
-_SAID: dict[Kind, str] = {
-    "sent": "task sent",
-    "done": "task done",
-    "failed": "task failed",
-    "lost": "task lost: its worker was not heard of any more, so it is sent again",
-    "refused": "a worker refuses tasks",
-    "given_up": "task given up: every process that began it died",
-    "paused": "paused",
-    "resumed": "goes on",
-    "waiting": "the broker is away; waiting for it",
-    "back": "the broker is back",
+_LINES: dict[Kind, tuple[int, str]] = {
+    "sent": (logging.DEBUG, "task sent"),
+    "done": (logging.INFO, "task done"),
+    "failed": (logging.ERROR, "task failed"),
+    "lost": (
+        logging.WARNING,
+        "task lost: its worker was not heard of any more, so it is sent again",
+    ),
+    "refused": (logging.WARNING, "a worker refuses tasks"),
+    "given_up": (logging.ERROR, "task given up: every process that began it died"),
+    "paused": (logging.WARNING, "paused"),
+    "resumed": (logging.WARNING, "goes on"),
+    "waiting": (logging.WARNING, "the broker is away; waiting for it"),
+    "back": (logging.WARNING, "the broker is back"),
+    "alone": (
+        logging.WARNING,
+        "no worker listens; start one (flaneur worker): the work goes on with the first",
+    ),
+    "joined": (logging.WARNING, "a worker listens again"),
 }
 
 
@@ -41,4 +36,5 @@ def log_event(event: Event) -> None:
         "error": event.told,
     }
     said = {name: value for name, value in fields.items() if value}
-    logger().log(_LEVELS[event.kind], _SAID[event.kind], **said)
+    level, line = _LINES[event.kind]
+    logger().log(level, line, **said)

@@ -12,9 +12,12 @@ from pydantic import TypeAdapter
 
 from index.files import read_text_file, write_bytes
 
-State = Literal["at work", "paused", "waiting", "finished", "stopped", "cancelled", "failed"]
-"""waiting : for the broker, which is away. stopped : by Ctrl-C. A coordinator that was killed says
-nothing: the file says `at work` then, and is written no more."""
+State = Literal[
+    "at work", "paused", "waiting", "alone", "finished", "stopped", "cancelled", "failed"
+]
+"""waiting : for the broker, which is away. alone : no worker listens. stopped : by
+Ctrl-C. A coordinator that was killed says nothing: the file says `at work` then, and is written no
+more."""
 
 ENDED: tuple[State, ...] = ("finished", "stopped", "cancelled", "failed")
 

@@ -17,7 +17,7 @@ from coordinator.watching.report_records import (
     Trouble,
     WorkerShare,
 )
-from coordinator.watching.telling import in_words
+from coordinator.watching.telling import TROUBLE_IN_WORDS, in_words
 from index.files import write_bytes
 from index.jobs import JobFolder
 
@@ -25,7 +25,6 @@ SLOWEST = 10
 TROUBLES = 50
 """Troubles that are told one by one, the last; all are counted."""
 
-_TROUBLE = ("lost", "refused", "failed", "given_up", "waiting")
 _OF_SHARDS = ("extract", "assign")
 
 
@@ -96,7 +95,7 @@ class _Sums:
             self._begun[record.stage] = record.at
         elif record.kind == "done":
             self._done(record)
-        elif record.kind in _TROUBLE:
+        elif record.kind in TROUBLE_IN_WORDS:
             task = f"{record.stage} {record.key}".strip()
             self.counts[record.kind] += 1
             self.troubles.append(Trouble(record.at, record.kind, task, record.worker, record.told))

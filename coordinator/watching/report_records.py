@@ -52,7 +52,7 @@ class WorkerShare:
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """Something that went wrong with an order, or with the broker."""
+    """Something that went wrong with an order, the broker or the workers."""
 
     at: str
     kind: str

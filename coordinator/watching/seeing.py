@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from contracts.errors import BadIndex
-from coordinator.batches.batch import batches_in
+from coordinator.batches.batch import BATCHES, batches_in
 from coordinator.watching.progress import ENDED, JobProgress, read_progress
 from index.commits import is_worked_on
 from index.jobs import jobs_of
@@ -68,7 +68,7 @@ class Sight:
     def _folders(self) -> Iterator[tuple[Path, Callable[[], bool]]]:
         for job in jobs_of(self._root):
             yield job.path, partial(is_worked_on, job)
-        for batch in batches_in(self._root / "batches"):
+        for batch in batches_in(self._root / BATCHES):
             yield batch.path, batch.is_worked_on
 
     def _seen(self, folder: Path, is_held: Callable[[], bool]) -> Seen | None:

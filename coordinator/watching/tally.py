@@ -20,6 +20,8 @@ _STATES: dict[str, State] = {
     "resumed": "at work",
     "waiting": "waiting",
     "back": "at work",
+    "alone": "alone",
+    "joined": "at work",
 }
 
 

@@ -7,13 +7,15 @@ from coordinator.watching.report_records import JobReport
 MOST = 20
 """Rows of a list that are told; report.json has all."""
 
-_TROUBLES = {
+TROUBLE_IN_WORDS = {
     "lost": "sent again, as their worker was not heard of any more",
     "refused": "refusals by workers",
     "failed": "failed",
     "given_up": "given up, as every process that began them died",
     "waiting": "times the broker was away",
+    "alone": "times no worker listened",
 }
+"""By the kind of an event."""
 
 
 def in_words(report: JobReport) -> str:
@@ -25,7 +27,7 @@ def in_brief(report: JobReport) -> list[str]:
     """Some lines for the end of a command: time by stage, and what went wrong."""
     stages = ", ".join(f"{each.stage} {duration(each.wall_s)}" for each in report.stages)
     lines = [f"Time by stage: {stages}"] if stages else []
-    lines += [f"{number} {_TROUBLES[kind]}" for kind, number in report.counts.items()]
+    lines += [f"{number} {TROUBLE_IN_WORDS[kind]}" for kind, number in report.counts.items()]
     if sum(each.images for each in report.skipped) > MOST:  # fewer are named one by one
         lines += [f"{each.images:,} skipped: {each.reason}" for each in report.skipped[:3]]
     return lines
@@ -70,7 +72,8 @@ def _lines(report: JobReport) -> Iterator[str]:
         (f"{each.images:,}  {each.reason}  (such as {each.example})" for each in report.skipped),
     )
     yield from _section(
-        "Troubles", (f"{number:,} {_TROUBLES[kind]}" for kind, number in report.counts.items())
+        "Troubles",
+        (f"{number:,} {TROUBLE_IN_WORDS[kind]}" for kind, number in report.counts.items()),
     )
     yield from _section(
         "The last of them",

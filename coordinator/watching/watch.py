@@ -8,8 +8,9 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 
 from redis import Redis, RedisError
 from structlog.contextvars import bound_contextvars
@@ -168,6 +169,17 @@ def watching(job: JobFolder, plan: JobPlan, shown: Progress) -> Iterator[Watch]:
 
 
 def _command(verb: str) -> str:
-    """The command that this process was started by; "" where it is another program's."""
+    """The command that this process was started by, for any folder; "" : another program's."""
     given = sys.argv[1:]
-    return without_password(shlex.join(["flaneur", *given])) if verb in given else ""
+    if verb not in given:
+        return ""
+    there = f"cd {shlex.quote(str(Path.cwd()))} && " if any(map(_is_relative, given[1:])) else ""
+    return there + without_password(shlex.join(["flaneur", *given]))
+
+
+def _is_relative(argument: str) -> bool:
+    """Whether it names something by where we are: FOLDER, --option=FOLDER or NAME=FOLDER."""
+    path = Path(argument.rpartition("=")[2])
+    with suppress(OSError, ValueError):  # too long for a path, say
+        return not path.is_absolute() and path.name != "" and path.exists()
+    return False

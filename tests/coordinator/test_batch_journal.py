@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from coordinator.batches.journal import AnswerReader, Answers, Journal
 from geo.geojson import PlacedTarget, error_feature, target_feature
 
@@ -64,3 +66,11 @@ def test_what_is_forgotten_is_asked_again(tmp_path: Path) -> None:
 
 def test_a_batch_not_begun_has_no_answers(tmp_path: Path) -> None:
     assert Answers.read(tmp_path / "answers.jsonl").count() == (0, 0)
+
+
+def test_a_full_disk_is_named() -> None:
+    with (
+        pytest.raises(OSError, match="No space left on device: '/dev/full'"),
+        Journal(Path("/dev/full")),
+    ):
+        pass

@@ -1,13 +1,15 @@
 """Photos from elsewhere, from a real web server that is busy, broken or hostile."""
 
+import socket
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from photo_server import Answer, PhotoServer, serving_photos
 
-from coordinator.batches.fetching import TRIES, Bounds, Fetcher, Unfetched
+from coordinator.batches.fetching import AT_ONCE, TRIES, Bounds, Fetcher, Unfetched
 
 QUICK = Bounds(pause_s=0.01, wait_s=0.05, connect_s=2.0, silence_s=2.0)
 
@@ -104,3 +106,19 @@ def test_a_stop_ends_the_wait_for_a_busy_server(server: PhotoServer, tmp_path: P
         with pytest.raises(Unfetched, match="its server says 503"):
             fetcher.image([url], tmp_path / "kept")
     assert server.asked["/a.jpg"] == 1
+
+
+def test_a_stop_ends_what_a_silent_server_keeps_waiting(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"http://127.0.0.1:{silent.getsockname()[1]}/a.jpg"
+        with Fetcher(Bounds(silence_s=600.0)) as fetcher, ThreadPoolExecutor() as pool:
+            asked = [pool.submit(fetcher.image, [url], tmp_path / str(at)) for at in range(4)]
+            taken = [silent.accept()[0] for _ in range(AT_ONCE)]
+            for each in taken:
+                each.recv(1)
+            fetcher.stop()
+            for future in asked:
+                with pytest.raises(Unfetched):
+                    future.result(timeout=60.0)
+        for each in taken:
+            each.close()

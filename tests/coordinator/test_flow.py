@@ -35,9 +35,12 @@ class Scripted:
     withdrawn: bool = False
     _there: dict[str, str] = field(default_factory=dict)
 
+    rooms: list[int] = field(default_factory=lambda: [4])
+    """What it has room for when it is asked, the last number for good."""
+
     def room(self) -> int:
         self._reach()
-        return 4
+        return self.rooms.pop(0) if len(self.rooms) > 1 else self.rooms[0]
 
     def send(self, orders: Mapping[str, Order]) -> None:
         self._reach()
@@ -222,6 +225,24 @@ def test_a_broker_that_is_away_is_waited_for_and_told_of_once() -> None:
     courier, told = Scripted(away=5), Told()
     assert keys(follow(courier, told=told)) == ALL
     assert told.kinds() == ["waiting", "back"]
+
+
+def test_workers_that_are_all_gone_are_told_of_once_and_waited_for() -> None:
+    class Deserted(Scripted):
+        def landed(self, wait_s: float) -> list[Landing]:
+            return super().landed(wait_s) if self.rooms == [4] else []
+
+    courier, told = Deserted(rooms=[4, 0, 0, 4, 4]), Told()
+    terms = Terms(lease_s=0.06, alone_s=0.0)
+    assert keys(follow(courier, told=told, terms=terms)) == ALL
+    assert [kind for kind in told.kinds() if kind != "lost"] == ["alone", "joined"]
+
+
+def test_a_worker_that_starts_is_not_missed() -> None:
+    courier, told = Scripted(rooms=[0]), Told()
+    assert keys(follow(courier, told=told)) == ALL
+    assert told.kinds() == []
+    assert courier.most == TERMS.in_flight
 
 
 def test_a_broker_that_stays_away_ends_the_work() -> None:

@@ -17,7 +17,7 @@ from coordinator.export.results import refuse_unknown, refuse_unwritable, write_
 from coordinator.following.events import Order
 from coordinator.following.flow import Outcome
 from coordinator.following.follow import Follower
-from coordinator.holding import IN_MEMORY_BYTES, HeldAnswers
+from coordinator.holding import HeldAnswers
 from coordinator.querying import Located, locate_photos
 from geo.geojson import Feature, PlacedMatch, error_feature, match_feature
 from index.opened import OpenedIndex
@@ -284,20 +284,24 @@ def test_nothing_is_sent_before_it_is_asked_for() -> None:
     assert follower.sent == [2]
 
 
-def test_answers_that_wait_for_their_turn_are_not_in_memory() -> None:
-    """While the first photo keeps a worker busy, thousands of others are answered."""
+def test_answers_that_wait_for_their_turn_are_not_in_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """While the first photo keeps a worker busy, many others are answered."""
+    in_memory = 1 << 22
+    monkeypatch.setattr("coordinator.holding.IN_MEMORY_BYTES", in_memory)
     features = tuple(match("a.jpg", rank) for rank in range(200))
     with HeldAnswers() as held:
         tracemalloc.start()
         try:
-            for number in range(1, 600):
+            for number in range(1, 160):
                 held.put(number, features, 0.25)
             peak = tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
-        assert peak < 1.5 * IN_MEMORY_BYTES
-        assert held.take(599) == (features, 0.25)
-        assert 599 not in held
+        assert peak < 1.5 * in_memory
+        assert held.take(159) == (features, 0.25)
+        assert 159 not in held
         assert 1 in held
 
 

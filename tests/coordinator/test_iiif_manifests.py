@@ -9,7 +9,7 @@ import pytest
 from photo_server import Answer, PhotoServer, serving_photos
 
 from contracts.errors import WrongInput
-from coordinator.batches.fetching import Bounds, Fetcher
+from coordinator.batches.fetching import Bounds, Fetcher, Unfetched
 from coordinator.batches.image_api import image_url
 from coordinator.batches.manifests import fetched_photo
 from coordinator.batches.photos import Photo
@@ -282,3 +282,39 @@ def test_an_image_on_no_web_server_is_an_error_answer(tmp_path: Path, fetcher: F
         fetcher,
     )
     assert photo.error == "its image has no address of http or https"
+
+
+def test_an_address_that_is_none_is_an_error_of_its_photo_alone(
+    tmp_path: Path, fetcher: Fetcher
+) -> None:
+    host, torn = "https://e.org", {"id": "http://[::1/x.jpg", "type": "Image"}
+    shown = manifest(
+        host, "m", canvas(host, "1", None, torn), canvas(host, "2", None, body(host, "b"))
+    )
+    gone = {"id": "http://[", "type": "Manifest"}
+    found = photos({"type": "Collection", "items": [gone, shown]}, tmp_path, fetcher)
+    assert [each.query for each in found] == ["http://[", f"{host}/canvas/1", f"{host}/canvas/2"]
+    assert "cannot be fetched" in found[0].error
+    with pytest.raises(Unfetched, match=r"http://\[::1/x\.jpg cannot be fetched"):
+        fetched_photo(found[1], fetcher, tmp_path)
+
+
+def test_a_good_service_of_a_picture_without_an_address_is_used(
+    tmp_path: Path, fetcher: Fetcher
+) -> None:
+    host = "https://e.org"
+    painted = {**body(host, "a", LEVEL_2), "id": "urn:a"}
+    shown = canvas(host, "1", None, painted)
+    shown["items"][0]["items"][0]["motivation"] = ["painting"]
+    (photo,) = photos(manifest(host, "m", shown), tmp_path, fetcher)
+    assert photo.urls == (f"{host}/a/full/!2048,2048/0/default.jpg",)
+
+
+def test_a_server_that_tells_nonsense_of_an_image_is_passed_by(
+    server: PhotoServer, tmp_path: Path, fetcher: Fetcher
+) -> None:
+    nonsense = {"type": "ImageService3", "width": 9000, "height": 6000, "sizes": 7}
+    put_json(server, "/a/info.json", nonsense)
+    url = server.put("/a.jpg", Answer(b"photo"))
+    photo = Photo("a", urls=(url,), info=f"{server.url}/a/info.json")
+    assert fetched_photo(photo, fetcher, tmp_path).read_bytes() == b"photo"

@@ -8,7 +8,7 @@ import pytest
 from contracts.errors import WrongInput
 from coordinator.batches.fetching import Fetcher
 from coordinator.batches.lists import paths_in, read_list
-from coordinator.batches.photos import Photo, photo_file, read_photos, write_photos
+from coordinator.batches.photos import Photo, photo_file, read_photos, told_apart, write_photos
 from coordinator.batches.sources import read_sources
 
 
@@ -96,6 +96,33 @@ def test_names_that_globs_give_twice_are_one_photo(fetcher: Fetcher) -> None:
 def test_other_addresses_are_refused(fetcher: Fetcher) -> None:
     with pytest.raises(WrongInput, match="http and https"):
         read_sources(["ftp://example.org/a.jpg"], fetcher)
+
+
+def test_another_scheme_in_a_list_is_an_error_of_that_photo_alone(
+    tmp_path: Path, fetcher: Fetcher
+) -> None:
+    table = tmp_path / "list.txt"
+    table.write_text("s3://bucket/a.jpg\nb.jpg\n")
+    elsewhere, here = read_sources([str(table)], fetcher)
+    assert (elsewhere.query, here.error) == ("s3://bucket/a.jpg", "")
+    assert "http and https" in elsewhere.error
+
+
+def test_a_list_of_windows_names_what_windows_does(tmp_path: Path) -> None:
+    table = tmp_path / "list.txt"
+    table.write_bytes("Sacré-Cœur.jpg\nrue de l’Est….jpg\n".encode("cp1252"))
+    assert read_list(table) == ["Sacré-Cœur.jpg", "rue de l’Est….jpg"]
+
+
+def test_two_photos_of_one_full_name_are_both_kept() -> None:
+    same = [Photo("1r", urls=(url,), full_name="id") for url in ("a", "b", "a")]
+    other = Photo("1r", urls=("c",), full_name="other")
+    found = told_apart([*same, other])
+    assert [(each.query, *each.urls) for each in found] == [
+        ("id", "a"),
+        ("id (2)", "b"),
+        ("other", "c"),
+    ]
 
 
 def test_a_list_on_disk_holds_every_name(tmp_path: Path) -> None:

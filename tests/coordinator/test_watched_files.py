@@ -2,9 +2,12 @@
 
 import errno
 import json
+import logging
 import os
+import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from made_follower import N_IMAGES, N_SHARDS, SHARD_SIZE, WORKERS, extract, made_job, order
@@ -12,8 +15,9 @@ from made_follower import N_IMAGES, N_SHARDS, SHARD_SIZE, WORKERS, extract, made
 from contracts.errors import Cancelled, TaskFailed
 from contracts.records import Skipped
 from coordinator.cli.show import Bars
-from coordinator.following.events import Event
+from coordinator.following.events import Event, Kind
 from coordinator.watching.journal import Journal, Record, path_of, read_journal
+from coordinator.watching.logged import log_event
 from coordinator.watching.pace import AT_LEAST, WINDOW_S, Pace
 from coordinator.watching.progress import read_progress
 from coordinator.watching.reasons import grouped
@@ -171,6 +175,25 @@ def test_a_journal_grows_by_what_is_done_and_not_by_what_is_sent(tmp_path: Path)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize("kind", get_args(Kind))
+def test_whatever_happens_is_logged_in_words(kind: Kind, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.DEBUG, logger="flaneur"):
+        log_event(Event(kind, order("extract", 3)))
+    assert len(caplog.records) == 1
+
+
+def test_a_job_without_workers_says_so_until_one_joins(tmp_path: Path) -> None:
+    job, plan = made_job(tmp_path)
+    with watching(job, plan, Bars(None)) as watch:
+        watch.hear(Event("alone"))
+    tally = Tally(plan, (), "")
+    tally.hear(Event("alone"))
+    assert tally.progress(()).state == "alone"
+    tally.hear(Event("joined"))
+    assert tally.progress(()).state == "at work"
+    assert "1 times no worker listened" in (job.path / "report.txt").read_text()
+
+
 def test_a_full_disk_does_not_end_the_job(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     job, plan = made_job(tmp_path)
     path_of(job.path).symlink_to("/dev/full")
@@ -185,6 +208,30 @@ def test_a_full_disk_does_not_end_the_job(tmp_path: Path, caplog: pytest.LogCapt
     progress = read_progress(job.path)
     assert progress is not None
     assert progress.images_done == N_IMAGES
+
+
+@pytest.mark.parametrize(
+    ("survey", "told"),
+    [
+        ("a town", "cd {here} && flaneur index 'a town' {here}/index"),
+        ("{here}/a town", "flaneur index '{here}/a town' {here}/index"),
+        ("s3://a/town", "flaneur index s3://a/town {here}/index"),
+    ],
+)
+def test_the_command_to_go_on_holds_in_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, survey: str, told: str
+) -> None:
+    (tmp_path / "a town").mkdir()
+    monkeypatch.chdir(tmp_path)
+    here = str(tmp_path)
+    given = ["flaneur", "index", survey.format(here=here), f"{here}/index"]
+    monkeypatch.setattr(sys, "argv", given)
+    job, plan = made_job(tmp_path / "index")
+    with watching(job, plan, Bars(None)):
+        pass
+    progress = read_progress(job.path)
+    assert progress is not None
+    assert progress.command == told.format(here=here)
 
 
 def test_reasons_that_differ_by_names_and_numbers_are_one() -> None:

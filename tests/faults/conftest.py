@@ -47,10 +47,10 @@ def whole_ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
 
 
 @pytest.fixture
-def ground(whole_ground: Ground) -> Iterator[Ground]:
-    """All workers are there, and nothing else; whatever was done is put right afterwards."""
-    yield whole_ground
+def ground(whole_ground: Ground) -> Ground:
+    """All workers are there, and nothing else: whatever was done is put right."""
     whole_ground.put_right()
+    return whole_ground
 
 
 @pytest.fixture

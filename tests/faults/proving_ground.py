@@ -43,11 +43,9 @@ class Ground:
             self.workers.append(self._start_worker(skew_s))
 
     def stop_workers(self) -> None:
-        """Ask all to end, and end them."""
+        """Kill all."""
         for worker in self.workers:
-            worker.terminate()
-        for worker in self.workers:
-            end_group(worker)
+            kill_group(worker)
         self.workers.clear()
 
     def wait_for_workers(self) -> None:
@@ -75,8 +73,7 @@ class Ground:
         self.switches.all_off()
         for worker in self.workers:
             if worker.pid in self._skewed:
-                worker.terminate()
-                end_group(worker)
+                kill_group(worker)
         self._skewed.clear()
         self.replenish()
         self.wait_for_workers()
@@ -179,13 +176,6 @@ def _skewed_clock(skew_s: int) -> dict[str, str]:
     }
 
 
-def end_group(process: "subprocess.Popen[bytes]") -> None:
-    """Give a process some seconds to end, then kill what is left of its group."""
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(5)
-    kill_group(process)
-
-
 def kill_group(process: "subprocess.Popen[bytes]") -> None:
     """Kill a process and all of its group."""
     with suppress(ProcessLookupError):
@@ -227,7 +217,6 @@ def running_ground(folder: Path) -> Iterator[Ground]:
     with _small_disk(folder / "disk") as can_fill, OwnServer(folder / "server") as server:
         ground = Ground(folder, folder / "disk", can_fill, server, switches)
         try:
-            ground.put_right()
             yield ground
         finally:
             switches.all_off()

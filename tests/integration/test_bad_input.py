@@ -23,7 +23,6 @@ from index.opened import OpenedIndex
 from survey import ReadOptions, read_survey
 
 SMALL = ("--crs", "EPSG:2154", "--max-frames", "120", "--max-words", "200")
-QUICK = (*SMALL, "--detectors", "star", "--descriptors", "sift", "--workers", "1")
 
 
 def say(*arguments: str | Path) -> tuple[int, str]:
@@ -34,11 +33,14 @@ def say(*arguments: str | Path) -> tuple[int, str]:
 
 
 @pytest.fixture(scope="module")
-def mixed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int, dict[str, Any]]:
+def mixed(
+    tmp_path_factory: pytest.TempPathFactory, engine: Engine
+) -> tuple[Path, int, dict[str, Any]]:
     """The mixed survey, indexed by relative paths, with a space and a slash, into itself."""
     folder = tmp_path_factory.mktemp("given")
     fill(folder / "my survey")
-    answer = run("index", "my survey/", "my survey/idx", *SMALL, "--json", folder=folder)
+    options = (*SMALL, "--json", "--broker", engine.app.conf.broker_url)
+    answer = run("index", "my survey/", "my survey/idx", *options, folder=folder)
     assert "Traceback" not in answer.stderr
     return folder / "my survey", answer.returncode, json.loads(answer.stdout)
 
@@ -78,7 +80,9 @@ def test_an_index_inside_its_survey_is_no_part_of_it(
     assert json.loads(again.stdout)["skipped"] == report["skipped"]
 
 
-def test_bad_photos_stop_no_other(mixed: tuple[Path, int, dict[str, Any]], tmp_path: Path) -> None:
+def test_bad_photos_stop_no_other(
+    mixed: tuple[Path, int, dict[str, Any]], tmp_path: Path, engine: Engine
+) -> None:
     folder = mixed[0]
     hostile = tmp_path / "\"'<script>alert(1)\N{ESCAPE}[31m.jpg"
     shutil.copy(folder / "b" / "same.jpg", hostile)
@@ -94,7 +98,8 @@ def test_bad_photos_stop_no_other(mixed: tuple[Path, int, dict[str, Any]], tmp_p
     }
     out = tmp_path / "out.geojson"
     photos = [*good, *bad, str(hostile), str(folder / "flat.png")]
-    answer = run("locate", *photos, "--index", folder / "idx", "--out", out)
+    broker = ("--broker", engine.app.conf.broker_url)
+    answer = run("locate", *photos, "--index", folder / "idx", "--out", out, *broker)
     assert answer.returncode == 3, answer.stderr
     assert "Traceback" not in answer.stderr
     features = json.loads(out.read_bytes())["features"]
@@ -200,6 +205,7 @@ def test_a_table_of_many_missing_images_is_summed_up(tmp_path: Path) -> None:
         (("--out", "FILE/x.geojson"), "is a file"),
         (("--out", "PHOTO"), "is one of the inputs"),
         (("--out", "/dev/null"), "no regular file"),
+        (("--out", "/nowhere/results.shp"), "'.shp' is no format that is written"),
         (("--out", "PHOTO.geojson", "--out", "/proc/none/x.kml"), "cannot write into /proc/none"),
     ],
 )

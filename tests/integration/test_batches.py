@@ -28,7 +28,7 @@ from coordinator.batches.results import answered_photos
 from coordinator.batches.running import forget_failed, open_pinned, run_batch
 from coordinator.batches.sources import read_sources
 from coordinator.batches.states import state_of_batch
-from coordinator.batches.submitting import submit
+from coordinator.batches.submitting import refuse_another, submit
 from coordinator.cli import main
 from coordinator.cli.show import Bars
 from coordinator.engine.running import Engine
@@ -167,6 +167,23 @@ def test_two_processes_do_not_work_on_one_batch(root: Path, photos: Path, engine
             work(folder, root, engine)
 
 
+def test_of_two_that_submit_one_name_at_once_the_second_is_refused(
+    root: Path, photos: Path
+) -> None:
+    folder = submitted(root, photos)
+    with pytest.raises(BadConfig, match="Another process submitted a batch b meanwhile"):
+        submitted(root, photos / "0.jpg")
+    assert sum(1 for _ in folder.photos()) == folder.read().n_photos
+
+
+def test_a_batch_does_not_change_its_priority_without_a_word(root: Path, photos: Path) -> None:
+    folder = submitted(root, photos)
+    plan = folder.read()
+    refuse_another(folder, plan, SEARCH, plan.priority, plan.sources)
+    with pytest.raises(BadConfig, match="with other priority"):
+        refuse_another(folder, plan, SEARCH, 1, plan.sources)
+
+
 def test_pruning_keeps_the_generation_that_an_unfinished_batch_is_located_against(
     root: Path, photos: Path, engine: Engine
 ) -> None:
@@ -244,10 +261,12 @@ def test_a_manifest_is_fetched_once_and_located_by_its_labels(
         folder = submitted(root, url)
         work(folder, root, engine)
         answers = found(folder)
-        server.put("/9.jpg", Answer((photos / "3.jpg").read_bytes()))
-        assert forget_failed(folder) == 1
-        work(folder, root, engine)
-        assert server.asked == {"/m": 1, "/0.jpg": 1, "/9.jpg": 2}
+        damaged = Answer((photos / "2.jpg").read_bytes())
+        server.put("/9.jpg", damaged, Answer((photos / "3.jpg").read_bytes()))
+        for _ in range(2):
+            assert forget_failed(folder) == 1
+            work(folder, root, engine)
+        assert server.asked == {"/m": 1, "/0.jpg": 1, "/9.jpg": 3}
         out = photos.parent / "at-once.geojsons"
         once = CliRunner().invoke(
             main, ["locate", url, "--index", str(root), *OPTIONS, "--out", str(out)]
@@ -275,8 +294,11 @@ def many(photos: Path, small_survey: Path) -> Path:
     return folder
 
 
-def test_a_batch_goes_on_by_itself_through_a_pause_and_a_kill(root: Path, many: Path) -> None:
-    submit_it = ("night", many, "--index", root, *OPTIONS, "--workers", "1")
+def test_a_batch_goes_on_by_itself_through_a_pause_and_a_kill(
+    root: Path, many: Path, engine: Engine
+) -> None:
+    broker = ("--broker", engine.app.conf.broker_url)
+    submit_it = ("night", many, "--index", root, *OPTIONS, *broker)
     folder = BatchFolder(root / BATCHES, "night")
     begun = run("batch", "submit", *submit_it)
     assert begun.returncode == 0, begun.stderr
@@ -300,7 +322,7 @@ def test_a_batch_goes_on_by_itself_through_a_pause_and_a_kill(root: Path, many: 
     state = json.loads(say("status", "night", "--index", root, "--json").stdout)
     assert (state["state"], state["photos"]) == ("stopped", 40)
     assert state["done"] == Answers.read(folder.answers).count()[0] > paused_at[0]
-    again = run("batch", "resume", "night", "--index", root, "--wait", "--workers", "1")
+    again = run("batch", "resume", "night", "--index", root, "--wait", *broker)
     assert again.returncode == 0, again.stderr
     assert len(answered(folder)) == len(set(answered(folder))) == 40
     sequence = say("results", "night", "--index", root, "--seq").stdout

@@ -79,6 +79,7 @@ def test_certificates_are_checked_unless_the_address_says_otherwise(encrypted: s
         ("http://localhost:6379", "this is no address"),
         ("redis://:my/secret@localhost:6379", "this is no address"),
         ("redis://:secret@localhost:port", "this is no address"),
+        ("redis://:secret@localhost:6379/abc", "this is no address"),
         ("redis://127.0.0.1:1/0", "Connection refused"),
     ],
 )

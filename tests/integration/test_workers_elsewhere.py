@@ -39,6 +39,8 @@ CONFIG = IndexConfig(
     features=FeatureConfig(detectors=("mser",), descriptors=("sift",), max_frames=60),
     codebooks=CodebookConfig(max_words=60),
 )
+ALL = 10
+"""Images in one shard: an order is refused ten times, each after a sixth of a lease."""
 
 
 @pytest.fixture(scope="module")
@@ -69,11 +71,11 @@ def of_another_version(tmp_path: Path) -> str:
 
 
 def index(
-    engine: AbstractContextManager[Engine], survey: Path, root: Path, config: IndexConfig = CONFIG
+    engine: AbstractContextManager[Engine], survey: Path, root: Path, shard_size: int = 5
 ) -> dict[str, str]:
     """Index the survey; what its words and postings are, by file."""
     intake = read_surveys([("", survey)], ReadOptions(crs="EPSG:2154"))
-    job, plan = make_plan(root, intake, config, 5)
+    job, plan = make_plan(root, intake, CONFIG, shard_size)
     run_job(job, plan, intake, engine, Bars(None))
     files = OpenedIndex(root).generation.files
     return {name: file.sha256 for name, file in files.items() if not name.startswith("catalogue")}
@@ -127,6 +129,7 @@ def lack(server: str, *queues: str) -> str:
     with connect(server) as client, pytest.raises(BrokerUnreachable) as told:
         check_workers(client, server, queues, patience_s=0)
     assert "a-secret" not in str(told.value)
+    assert "flaneur worker --broker redis" in str(told.value)
     return str(told.value)
 
 
@@ -150,7 +153,7 @@ def test_survey_and_index_may_be_mounted_elsewhere_and_nothing_else_is_opened(
     indices = folder / "indices"
     assert index(workers_at(server), folder / "surveys" / "street", indices / "town") == alone
     with pytest.raises(TaskFailed, match="outside of this worker's roots"):
-        index(workers_at(server), small_survey, indices / "of a survey it has not")
+        index(workers_at(server), small_survey, indices / "of a survey it has not", ALL)
 
 
 def test_a_worker_of_another_version_refuses_and_one_of_ours_does_the_work(
@@ -186,7 +189,7 @@ def test_a_worker_that_reads_another_configuration_refuses_and_the_user_is_told(
 ) -> None:
     survey = here[0] / "surveys" / "street"
     intake = read_surveys([("", survey)], ReadOptions(crs="EPSG:2154"))
-    job, _ = make_plan(tmp_path / "index", intake, CONFIG, 5)
+    job, _ = make_plan(tmp_path / "index", intake, CONFIG, ALL)
     shutil.copytree(tmp_path / "index", there / "own" / "index")
     plan = there / "own" / job.path.relative_to(tmp_path) / "plan.json"
     content = json.loads(plan.read_text())
@@ -196,4 +199,4 @@ def test_a_worker_that_reads_another_configuration_refuses_and_the_user_is_told(
 
     told = f"in the plan of job {job.job}.*Install the same version on both"
     with pytest.raises(TaskFailed, match=told):
-        index(workers_at(server), survey, tmp_path / "index")
+        index(workers_at(server), survey, tmp_path / "index", ALL)
