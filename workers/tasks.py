@@ -11,7 +11,7 @@ from celery.exceptions import Ignore
 from celery.signals import task_postrun
 from redis import RedisError
 
-from contracts.errors import Cancelled, Refused
+from contracts.errors import Cancelled, Refused, TaskFailed
 from contracts.records import Receipt
 from index.control import read_wish
 from index.jobs import JobFolder
@@ -152,13 +152,13 @@ def _wanted(request: JobMessage) -> Iterator[JobFolder]:
 
     Raises
     ------
-    Cancelled, Withdrawn : it is not. Refused : as `JobMessage.folder`.
+    Cancelled, TaskFailed : it is not. Refused : as `JobMessage.folder`.
     """
     job = request.folder()
     if read_wish(job.path) == "cancel":
         raise Cancelled(f"job {job.job} is cancelled.")
     if job.is_closed:
-        raise Withdrawn(f"job {job.job} is done.")
+        raise TaskFailed(f"job {job.job} is finished. Run the same command again to see it.")
     try:
         yield job
     finally:

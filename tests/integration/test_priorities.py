@@ -35,6 +35,15 @@ def index(indexed: Callable[[IndexConfig], OpenedIndex]) -> OpenedIndex:
     return indexed(CONFIG)
 
 
+@pytest.fixture(autouse=True)
+def job(index: OpenedIndex) -> Iterator[JobFolder]:
+    """The job that made the index, as if there were work to do."""
+    job = JobFolder(index.root, index.generation.segments[0].jobs[0])
+    job.open_again()
+    yield job
+    job.close()
+
+
 def probes(index: OpenedIndex) -> Iterator[Order]:
     """Endless work of a job, of which nothing is kept."""
     job = JobFolder(index.root, index.generation.segments[0].jobs[0])
@@ -103,3 +112,12 @@ def test_work_that_nobody_wants_any_more_is_not_done(engine: Engine, index: Open
     assert server.llen(queue_key("extract", JOB)) == 0
     assert len(list(server.scan_iter(results))) - known <= engine.n_workers  # those at work
     assert not list(server.scan_iter(starts_key(f"{ours}*")))
+
+
+def test_work_for_a_job_that_is_finished_fails_and_says_so(
+    engine: Engine, index: OpenedIndex, job: JobFolder
+) -> None:
+    job.close()
+    (outcome,) = engine.follower.outcomes(islice(probes(index), 1))
+    assert outcome.error is not None
+    assert "is finished. Run the same command again" in outcome.error
